@@ -1,0 +1,18 @@
+#version 460
+// What lies at the centre of a pixel: normal, distance and number of the nearest object.
+#extension GL_GOOGLE_include_directive : require
+#include "camera.glsl"
+#include "surface.glsl"
+
+layout(location = 0) flat in uint inTriangle;
+layout(location = 0) out vec4 outNormalDepth;
+layout(location = 1) out vec4 outObject;
+
+void main()
+{
+    vec3 ray = CameraRay(gl_FragCoord.xy + jitter);
+    Instance instance = instances[instanceIndex];
+    Hit hit = IntersectCameraRay(instance, inTriangle, ray);
+    outNormalDepth = vec4(hit.normal, hit.t * length(ray));
+    outObject = vec4(instance.number, 0.0, 0.0, 0.0);
+}

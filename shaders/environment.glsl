@@ -1,0 +1,62 @@
+// Radiance from afar: an equirectangular image or a constant.
+// Direction d looks up u = atan2(d.x, -d.z) / 2pi, v = acos(d.y) / pi; texels are centred at (i + 0.5) / size.
+#ifndef ENVIRONMENT_GLSL
+#define ENVIRONMENT_GLSL
+
+#extension GL_EXT_samplerless_texture_functions : require
+#include "shared.glsl"
+
+// Constants beyond those of effects.glsl start at 64.
+layout(constant_id = 64) const bool ENVIRONMENT_IMAGE = true;
+
+const float PI = 3.14159265358979;
+
+// atan(y / x) in the right quadrant, in radians. Vulkan lets the built-in be off by 4096 ULP, several texels of a large
+// image; this minimax polynomial is within 2e-7 everywhere. 0 at the origin.
+float Atan2(float y, float x)
+{
+    float larger = max(abs(x), abs(y));
+    float t = larger == 0.0 ? 0.0 : min(abs(x), abs(y)) / larger;
+    float s = t * t;
+    float p = 0.0028498899;
+    p = p * s - 0.0160686318;
+    p = p * s + 0.0426915288;
+    p = p * s - 0.0750429556;
+    p = p * s + 0.1064093485;
+    p = p * s - 0.1420364529;
+    p = p * s + 0.1999261975;
+    p = p * s - 0.3333307207;
+    float angle = t + t * s * p;
+    angle = abs(y) > abs(x) ? 0.5 * PI - angle : angle;
+    angle = x < 0.0 ? PI - angle : angle;
+    return y < 0.0 ? -angle : angle;
+}
+
+// Bilinear by hand: the filter of a GPU weighs texels in steps of 1/256 only.
+vec3 SampleEnvironmentImage(vec2 uv, int level)
+{
+    ivec2 size = textureSize(environment, level);
+    vec2 position = uv * vec2(size) - 0.5;
+    vec2 corner = floor(position);
+    vec2 weight = position - corner;
+    ivec2 low = ivec2(corner);
+    ivec2 high = low + 1;
+    low.x = low.x < 0 ? low.x + size.x : low.x;
+    high.x = high.x >= size.x ? high.x - size.x : high.x;
+    low.y = max(low.y, 0);
+    high.y = min(high.y, size.y - 1);
+    vec3 top = mix(texelFetch(environment, low, level).rgb, texelFetch(environment, ivec2(high.x, low.y), level).rgb, weight.x);
+    vec3 bottom = mix(texelFetch(environment, ivec2(low.x, high.y), level).rgb, texelFetch(environment, high, level).rgb, weight.x);
+    return mix(top, bottom, weight.y);
+}
+
+// Radiance arriving from `direction`, of any length above 0. `lod` is the level of the image's mip chain.
+vec3 SampleEnvironment(vec3 direction, float lod)
+{
+    if (!ENVIRONMENT_IMAGE) return frame.environmentRadiance;
+    float u = Atan2(direction.x, -direction.z) / (2.0 * PI) + frame.environmentTurn;
+    float v = Atan2(length(direction.xz), direction.y) / PI;
+    return frame.environmentRadiance * SampleEnvironmentImage(vec2(u - floor(u), v), int(lod));
+}
+
+#endif

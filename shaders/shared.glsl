@@ -1,0 +1,59 @@
+// What the host and the shaders share: struct layouts and bindings. src/gpu/shared.rs mirrors the structs; a test reads
+// every member back. Space: world axes with the camera at the origin, so that far-off scenes keep their precision.
+#ifndef SHARED_GLSL
+#define SHARED_GLSL
+
+struct Frame {
+    mat4 viewProjection;       // to clip space, depth reversed: 1 at the near plane, 0 at infinity
+    vec3 rayCorner;            // direction through the outer corner of the top left pixel
+    uint lightCount;
+    vec3 rayRight;             // added for each pixel to the right
+    float environmentTurn;     // rotation of the environment in turns
+    vec3 rayDown;              // added for each pixel down
+    uint environmentVisible;   // 0: black where the camera sees it directly
+    vec3 environmentRadiance;  // its constant radiance, or the factor of its image
+    float reflectionRed;       // debug controls of the original
+    float reflectionIntensity;
+    float transmissionGreen;
+    float transmissionIntensity;
+    uint flippedRatio;
+};
+
+struct Instance {
+    mat4x3 objectToWorld;
+    mat4x3 normalToWorld;      // its last column is unused
+    vec3 rayOrigin;            // the camera in the mesh's space
+    uint firstTriangle;
+    mat4x3 worldToObject;      // directions only: its last column is unused
+    uint firstVertex;
+    uint material;
+    uint smoothNormals;        // 0: normals of the faces
+    uint number;               // of the object in the scene file, from 1
+};
+
+struct Material {
+    float refractionIndex;
+    float roughness;
+};
+
+struct Light {
+    vec3 position;
+    vec3 intensity;            // W/sr
+};
+
+layout(std430, set = 0, binding = 0) readonly buffer FrameBuffer { Frame frame; };
+layout(std430, set = 0, binding = 1) readonly buffer InstanceBuffer { Instance instances[]; };
+layout(std430, set = 0, binding = 2) readonly buffer MaterialBuffer { Material materials[]; };
+layout(std430, set = 0, binding = 3) readonly buffer LightBuffer { Light lights[]; };
+layout(std430, set = 0, binding = 4) readonly buffer PositionBuffer { float positions[]; };
+layout(std430, set = 0, binding = 5) readonly buffer NormalBuffer { float normals[]; };
+layout(std430, set = 0, binding = 6) readonly buffer TriangleBuffer { uint triangles[]; };
+layout(set = 0, binding = 7) uniform texture2D environment;
+
+layout(push_constant) uniform Push {
+    vec2 jitter;               // of this sample inside the pixel, in pixels from its centre
+    vec2 clipOffset;           // the same in clip space
+    uint instanceIndex;
+};
+
+#endif

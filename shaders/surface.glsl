@@ -1,0 +1,66 @@
+// The point of a triangle that a ray meets. Where the rasteriser only says which triangle covers a pixel, position and
+// normal come from here, so that a picture does not depend on how finely a device snaps and interpolates.
+#ifndef SURFACE_GLSL
+#define SURFACE_GLSL
+
+#include "shared.glsl"
+
+struct Hit {
+    float t;        // in lengths of the ray's direction
+    vec3 position;
+    vec3 normal;    // of unit length, towards the outside of the surface; interpolated where the object is smooth
+};
+
+vec3 FetchPosition(uint vertex)
+{
+    return vec3(positions[3 * vertex], positions[3 * vertex + 1], positions[3 * vertex + 2]);
+}
+
+vec3 FetchNormal(uint vertex)
+{
+    return vec3(normals[3 * vertex], normals[3 * vertex + 1], normals[3 * vertex + 2]);
+}
+
+uvec3 FetchTriangle(Instance instance, uint triangle)
+{
+    uint first = 3 * (instance.firstTriangle + triangle);
+    return instance.firstVertex + uvec3(triangles[first], triangles[first + 1], triangles[first + 2]);
+}
+
+// Where the camera's ray along `direction` meets the plane of `triangle`: Moeller & Trumbore 1997, in the mesh's space.
+Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
+{
+    uvec3 vertices = FetchTriangle(instance, triangle);
+    vec3 corner = FetchPosition(vertices.x);
+    vec3 edge1 = FetchPosition(vertices.y) - corner;
+    vec3 edge2 = FetchPosition(vertices.z) - corner;
+    vec3 ray = mat3(instance.worldToObject) * direction;
+
+    vec3 p = cross(ray, edge2);
+    vec3 fromCorner = instance.rayOrigin - corner;
+    vec3 q = cross(fromCorner, edge1);
+    float inverse = 1.0 / dot(edge1, p);
+
+    Hit hit;
+    hit.t = dot(edge2, q) * inverse;
+    hit.position = hit.t * direction;
+    vec3 normal = cross(edge1, edge2);
+    if (instance.smoothNormals != 0) {
+        // A pixel's centre may lie just outside of the triangle that the rasteriser chose, and far outside of one seen on edge.
+        float b1 = clamp(dot(fromCorner, p) * inverse, 0.0, 1.0);
+        float b2 = clamp(dot(ray, q) * inverse, 0.0, 1.0 - b1);
+        vec3 first = FetchNormal(vertices.x);
+        vec3 blended = first + b1 * (FetchNormal(vertices.y) - first) + b2 * (FetchNormal(vertices.z) - first);
+        // An interpolated normal that faces away from the viewer although its face does not, at silhouettes, is bent to
+        // just above the horizon.
+        vec3 towards = -normalize(ray);
+        float cosine = dot(normalize(blended), towards);
+        bool front = dot(normal, towards) > 0.0;
+        if (front && cosine < 1e-4) blended = normalize(blended) + (1e-3 - cosine) * towards;
+        normal = blended;
+    }
+    hit.normal = normalize(mat3(instance.normalToWorld) * normal);
+    return hit;
+}
+
+#endif

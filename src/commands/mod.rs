@@ -1,0 +1,104 @@
+//! What the program offers, one file a command.
+
+mod devices;
+mod render;
+
+use std::error::Error as _;
+use std::io::{IsTerminal, Write};
+use std::process::ExitCode;
+
+use clap::{ArgAction, Args, Parser, Subcommand};
+
+use crate::{Error, Result};
+
+/// Renders glass, and shows what accuracy costs
+#[derive(Debug, Parser)]
+#[command(name = "vitrum", version, max_term_width = 110, arg_required_else_help = true)]
+#[command(after_help = "Exit codes: 0 done; 1 a check that was asked for failed; 2 bad usage or bad input; 3 no usable Vulkan device.")]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+    #[command(flatten)]
+    talk: Talk,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Renders one image, off screen
+    Render(render::RenderCommand),
+    /// Lists the Vulkan devices and what each can do
+    Devices(devices::DevicesCommand),
+}
+
+/// How much is said beside results.
+#[derive(Clone, Copy, Debug, Args)]
+struct Talk {
+    /// Say less: errors only
+    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    quiet: bool,
+    /// Say more
+    #[arg(short, long, global = true, action = ArgAction::Count)]
+    verbose: u8,
+}
+
+impl Talk {
+    /// Something that the user should know, on stderr.
+    fn note(self, text: &str) {
+        if !self.quiet {
+            eprintln!("{text}");
+        }
+    }
+
+    /// Something for those who asked for more.
+    fn detail(self, text: &str) {
+        if self.verbose > 0 {
+            eprintln!("{text}");
+        }
+    }
+
+    /// A progress bar pays on a terminal only.
+    fn shows_progress(self) -> bool {
+        !self.quiet && std::io::stderr().is_terminal()
+    }
+}
+
+/// Parses the command line of the process, runs it, and tells what went wrong in one line.
+pub fn main() -> ExitCode {
+    let cli = match Cli::try_parse() {
+        Ok(cli) => cli,
+        Err(error) => {
+            // Help and version too end here, with code 0. A closed stdout or stderr leaves nothing to tell.
+            let _ = error.print();
+            return ExitCode::from(u8::try_from(error.exit_code()).unwrap_or(2));
+        }
+    };
+    let result = match cli.command {
+        Command::Render(command) => command.run(cli.talk),
+        Command::Devices(command) => command.run(),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            report(&error);
+            ExitCode::from(error.exit_code())
+        }
+    }
+}
+
+fn report(error: &Error) {
+    let mut text = format!("error: {error}\n");
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text += &format!("Caused by: {cause}\n");
+        source = cause.source();
+    }
+    let _ = std::io::stderr().write_all(text.as_bytes());
+}
+
+/// Prints a result; a reader that went away, as `head` does, is no failure.
+fn print(text: &str) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::file("standard output", "write", error)),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,256 @@
+//! The effects, as one table: what each is called, what in a scene calls for it, and which models honour it.
+//!
+//! An effect that is off is compiled out: its bit sets a specialization constant of the shaders.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::Deserialize;
+
+use crate::options::Model;
+use crate::scene::{Dielectric, Material, Scene, Surface};
+
+/// A row of the table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[repr(u32)]
+pub enum Effect {
+    /// Light mirrored by a surface
+    Reflection,
+    /// Light refracted through a surface
+    Transmission,
+    /// More than one interface on the way of the light
+    Interior,
+    /// Point lights
+    DirectLight,
+    /// Surfaces between a point light and what it lights
+    Shadows,
+    /// Light scattered by a rough dielectric
+    Roughness,
+    /// Light that a single bounce between microfacets loses
+    EnergyCompensation,
+    /// Light absorbed on its way through a body
+    Absorption,
+    /// An index of refraction that changes with the wavelength
+    Dispersion,
+    /// Dielectrics that overlap or hold one another
+    Nesting,
+    /// Panes without an inside
+    ThinWalled,
+    /// Surfaces that are no dielectrics
+    Opaque,
+    /// Images on surfaces
+    Textures,
+}
+
+/// The highest roughness that still counts as smooth: the original's default.
+pub const SMOOTH: f64 = 0.01;
+
+struct Row {
+    effect: Effect,
+    name: &'static str,
+    models: &'static [Model],
+    called_for: fn(&Scene) -> bool,
+}
+
+/// THE table. Detection is conservative: an effect that might show is called for.
+const TABLE: [Row; 13] = {
+    use Effect::*;
+    use Model::Single;
+    const fn row(
+        effect: Effect,
+        name: &'static str,
+        models: &'static [Model],
+        called_for: fn(&Scene) -> bool,
+    ) -> Row {
+        Row { effect, name, models, called_for }
+    }
+    [
+        row(Reflection, "reflection", &[Single], |s| any_dielectric(s, |_| true)),
+        row(Transmission, "transmission", &[Single], |s| any_dielectric(s, |_| true)),
+        row(Interior, "interior", &[], |s| any_dielectric(s, |_| true)),
+        row(DirectLight, "direct-light", &[Single], |s| has_light(s)),
+        row(Shadows, "shadows", &[], |s| has_light(s)),
+        row(Roughness, "roughness", &[], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
+        row(EnergyCompensation, "energy-compensation", &[], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
+        row(Absorption, "absorption", &[], |s| any_dielectric(s, absorbs)),
+        row(Dispersion, "dispersion", &[], |s| any_dielectric(s, |d| d.dispersion > 0.0)),
+        row(Nesting, "nesting", &[], nests),
+        row(ThinWalled, "thin-walled", &[], |s| any_dielectric(s, |d| d.thin_walled)),
+        row(Opaque, "opaque", &[], |s| surfaces(s).any(|x| matches!(x, Surface::Opaque(_)))),
+        row(Textures, "textures", &[], |s| {
+            surfaces(s).any(|x| matches!(x, Surface::Opaque(opaque) if opaque.base_color_texture.is_some()))
+        }),
+    ]
+};
+
+/// The surfaces that objects wear; a material that no object wears calls for nothing.
+fn surfaces(scene: &Scene) -> impl Iterator<Item = &Surface> {
+    scene.objects.iter().map(|object| &scene.materials[object.material]).map(|Material { surface, .. }| surface)
+}
+
+fn any_dielectric(scene: &Scene, test: impl Fn(&Dielectric) -> bool) -> bool {
+    surfaces(scene).any(|surface| matches!(surface, Surface::Dielectric(dielectric) if test(dielectric)))
+}
+
+fn has_light(scene: &Scene) -> bool {
+    !scene.objects.is_empty() && scene.lights.iter().any(|light| light.intensity.max_element() > 0.0)
+}
+
+fn absorbs(dielectric: &Dielectric) -> bool {
+    dielectric.attenuation_distance.is_finite() && dielectric.attenuation_color.min_element() < 1.0
+}
+
+/// Bounding boxes that meet may hold bodies that meet, and a camera in one may be inside the body.
+fn nests(scene: &Scene) -> bool {
+    let boxes: Vec<_> = scene
+        .objects
+        .iter()
+        .filter(|object| matches!(scene.materials[object.material].surface, Surface::Dielectric(_)))
+        .map(|object| scene.bounds_of(object))
+        .collect();
+    boxes.iter().enumerate().any(|(i, a)| {
+        a.contains(scene.camera.position) || boxes[i + 1..].iter().any(|b| a.intersects(b))
+    })
+}
+
+impl Effect {
+    /// Every effect, in the order of the table.
+    pub fn all() -> impl Iterator<Item = Self> {
+        TABLE.iter().map(|row| row.effect)
+    }
+
+    fn row(self) -> &'static Row {
+        &TABLE[self as usize]
+    }
+
+    /// The name on the command line, in stats and reports.
+    pub fn name(self) -> &'static str {
+        self.row().name
+    }
+
+    /// Whether `model` simulates this.
+    pub fn honoured_by(self, model: Model) -> bool {
+        self.row().models.contains(&model)
+    }
+
+    /// Whether something in `scene` may show this.
+    pub fn called_for_by(self, scene: &Scene) -> bool {
+        (self.row().called_for)(scene)
+    }
+}
+
+impl FromStr for Effect {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        Self::all().find(|effect| effect.name() == name).ok_or_else(|| {
+            let known: Vec<_> = Self::all().map(Self::name).collect();
+            format!("unknown effect {name:?}; known: auto, all, {}", known.join(", "))
+        })
+    }
+}
+
+/// A set of effects.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effects(u32);
+
+impl Effects {
+    /// Whether `effect` is in the set.
+    pub fn contains(self, effect: Effect) -> bool {
+        self.0 & (1 << effect as u32) != 0
+    }
+
+    /// The effects in the order of the table.
+    pub fn iter(self) -> impl Iterator<Item = Effect> {
+        Effect::all().filter(move |&effect| self.contains(effect))
+    }
+
+    /// The names in the order of the table.
+    pub fn names(self) -> Vec<&'static str> {
+        self.iter().map(Effect::name).collect()
+    }
+}
+
+impl FromIterator<Effect> for Effects {
+    fn from_iter<I: IntoIterator<Item = Effect>>(effects: I) -> Self {
+        Self(effects.into_iter().fold(0, |bits, effect| bits | 1 << effect as u32))
+    }
+}
+
+/// Which effects a user wants: `auto`, `all` or names; `-name` takes one away. As given, for messages and metadata.
+#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "String")]
+pub struct Selection {
+    terms: Vec<Term>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Term {
+    Auto,
+    All,
+    With(Effect),
+    Without(Effect),
+}
+
+impl Default for Selection {
+    fn default() -> Self {
+        Self { terms: vec![Term::Auto] }
+    }
+}
+
+impl Selection {
+    /// The effects that this selects for `scene`.
+    pub fn resolve(&self, scene: &Scene) -> Effects {
+        Effect::all()
+            .filter(|&effect| {
+                // Later terms win; a selection that only takes away starts from what the scene calls for.
+                let start = matches!(self.terms.first(), Some(Term::Without(_))) && effect.called_for_by(scene);
+                self.terms.iter().fold(start, |on, &term| match term {
+                    Term::Auto => on || effect.called_for_by(scene),
+                    Term::All => true,
+                    Term::With(named) => on || named == effect,
+                    Term::Without(named) => on && named != effect,
+                })
+            })
+            .collect()
+    }
+}
+
+impl FromStr for Selection {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let term = |term: &str| match term.trim() {
+            "auto" => Ok(Term::Auto),
+            "all" => Ok(Term::All),
+            name => match name.strip_prefix('-') {
+                Some(name) => name.parse().map(Term::Without),
+                None => name.parse().map(Term::With),
+            },
+        };
+        Ok(Self { terms: text.split(',').map(term).collect::<Result<_, _>>()? })
+    }
+}
+
+impl TryFrom<String> for Selection {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<Self, String> {
+        text.parse()
+    }
+}
+
+impl fmt::Display for Selection {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (i, term) in self.terms.iter().enumerate() {
+            let comma = if i == 0 { "" } else { "," };
+            match term {
+                Term::Auto => write!(f, "{comma}auto"),
+                Term::All => write!(f, "{comma}all"),
+                Term::With(effect) => write!(f, "{comma}{}", effect.name()),
+                Term::Without(effect) => write!(f, "{comma}-{}", effect.name()),
+            }?;
+        }
+        Ok(())
+    }
+}

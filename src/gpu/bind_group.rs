@@ -1,0 +1,103 @@
+//! Resources that a pipeline sees: a descriptor set, written once.
+
+use ash::vk;
+
+use super::error::Context;
+use super::{Buffer, Gpu, Image, Result};
+
+/// A resource at one binding; its position in the list is the binding's number.
+#[derive(Clone, Copy)]
+pub enum Bind<'a> {
+    /// A storage buffer.
+    Buffer(&'a Buffer),
+    /// An image that shaders fetch texels from.
+    Sampled(&'a Image),
+    /// An image that shaders read and write.
+    Storage(&'a Image),
+}
+
+impl Bind<'_> {
+    fn kind(&self) -> vk::DescriptorType {
+        match self {
+            Self::Buffer(_) => vk::DescriptorType::STORAGE_BUFFER,
+            Self::Sampled(_) => vk::DescriptorType::SAMPLED_IMAGE,
+            Self::Storage(_) => vk::DescriptorType::STORAGE_IMAGE,
+        }
+    }
+}
+
+/// Set 0 of a pipeline. The resources must outlive its use in a recording, which borrowing both from one owner ensures.
+pub struct BindGroup {
+    pub(super) layout: vk::DescriptorSetLayout,
+    pub(super) set: vk::DescriptorSet,
+    pool: vk::DescriptorPool,
+    gpu: Gpu,
+}
+
+impl BindGroup {
+    /// A group of `resources`, in the order of their bindings.
+    pub fn new(gpu: &Gpu, name: &str, resources: &[Bind<'_>]) -> Result<Self> {
+        let bindings: Vec<_> = (0..)
+            .zip(resources)
+            .map(|(binding, resource)| {
+                vk::DescriptorSetLayoutBinding::default()
+                    .binding(binding)
+                    .descriptor_type(resource.kind())
+                    .descriptor_count(1)
+                    .stage_flags(vk::ShaderStageFlags::ALL)
+            })
+            .collect();
+        // Kinds that repeat may be listed as often as they occur.
+        let sizes: Vec<_> =
+            resources.iter().map(|r| vk::DescriptorPoolSize { ty: r.kind(), descriptor_count: 1 }).collect();
+        let mut group = Self {
+            layout: vk::DescriptorSetLayout::null(),
+            set: vk::DescriptorSet::null(),
+            pool: vk::DescriptorPool::null(),
+            gpu: gpu.clone(),
+        };
+        let layout = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+        // SAFETY: the infos point to locals; whatever fails, dropping `group` destroys what was made and ignores nulls.
+        unsafe {
+            group.layout =
+                gpu.device.create_descriptor_set_layout(&layout, None).context("vkCreateDescriptorSetLayout")?;
+            group.pool = gpu.device.create_descriptor_pool(&pool, None).context("vkCreateDescriptorPool")?;
+            let layouts = [group.layout];
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(group.pool).set_layouts(&layouts);
+            group.set = gpu.device.allocate_descriptor_sets(&info).context("vkAllocateDescriptorSets")?[0];
+        }
+        gpu.name(group.layout, name);
+        gpu.name(group.set, name);
+        for (binding, resource) in (0..).zip(resources) {
+            let write = vk::WriteDescriptorSet::default()
+                .dst_set(group.set)
+                .dst_binding(binding)
+                .descriptor_type(resource.kind());
+            let image = |image: &Image, layout| [vk::DescriptorImageInfo::default().image_view(image.view).image_layout(layout)];
+            // SAFETY: the set is not in use yet; resources and infos are alive.
+            let update = |write| unsafe { gpu.device.update_descriptor_sets(&[write], &[]) };
+            match resource {
+                Bind::Buffer(buffer) => {
+                    let info = [vk::DescriptorBufferInfo::default().buffer(buffer.handle).range(vk::WHOLE_SIZE)];
+                    update(write.buffer_info(&info));
+                }
+                Bind::Sampled(sampled) => {
+                    update(write.image_info(&image(sampled, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)));
+                }
+                Bind::Storage(storage) => update(write.image_info(&image(storage, vk::ImageLayout::GENERAL))),
+            }
+        }
+        Ok(group)
+    }
+}
+
+impl Drop for BindGroup {
+    fn drop(&mut self) {
+        // SAFETY: `Commands::run` waits, so the set is not in use; it goes with its pool.
+        unsafe {
+            self.gpu.device.destroy_descriptor_pool(self.pool, None);
+            self.gpu.device.destroy_descriptor_set_layout(self.layout, None);
+        }
+    }
+}

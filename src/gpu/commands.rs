@@ -1,0 +1,429 @@
+//! Recording, submitting, waiting and timing.
+
+use ash::vk;
+use bytemuck::NoUninit;
+
+use super::error::Context;
+use super::pipeline::Pipeline;
+use super::{
+    BindGroup, Buffer, BufferDesc, BufferUse, ComputePipeline, Gpu, GpuError, GraphicsPipeline, Image, ImageDesc, Result, Use,
+};
+
+/// Passes that one recording can time.
+const MAX_TIMED: u32 = 64;
+
+/// How long a pass took on the device.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PassTime {
+    /// The pass.
+    pub name: &'static str,
+    /// Milliseconds; `None` where the device has no clock.
+    pub gpu_ms: Option<f64>,
+}
+
+/// What recordings need: a pool, a fence, timestamps. One recording executes at a time.
+pub struct Commands {
+    pool: vk::CommandPool,
+    buffer: vk::CommandBuffer,
+    fence: vk::Fence,
+    queries: vk::QueryPool,
+    gpu: Gpu,
+}
+
+impl Commands {
+    /// Ready to record.
+    pub fn new(gpu: &Gpu) -> Result<Self> {
+        let mut commands = Self {
+            pool: vk::CommandPool::null(),
+            buffer: vk::CommandBuffer::null(),
+            fence: vk::Fence::null(),
+            queries: vk::QueryPool::null(),
+            gpu: gpu.clone(),
+        };
+        let pool = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.info().queue_family);
+        let queries = vk::QueryPoolCreateInfo::default()
+            .query_type(vk::QueryType::TIMESTAMP)
+            .query_count(2 * MAX_TIMED);
+        // SAFETY: the infos point to locals; whatever fails, dropping `commands` destroys what was made and ignores nulls.
+        unsafe {
+            commands.pool = gpu.device.create_command_pool(&pool, None).context("vkCreateCommandPool")?;
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(commands.pool).command_buffer_count(1);
+            commands.buffer = gpu.device.allocate_command_buffers(&info).context("vkAllocateCommandBuffers")?[0];
+            commands.fence = gpu.device.create_fence(&Default::default(), None).context("vkCreateFence")?;
+            commands.queries = gpu.device.create_query_pool(&queries, None).context("vkCreateQueryPool")?;
+        }
+        Ok(commands)
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Records what `record` says, submits it and waits until the device is done. Returns the times of its passes.
+    pub fn run(&mut self, record: impl FnOnce(&mut Recorder<'_>)) -> Result<Vec<PassTime>> {
+        let device = &self.gpu.device;
+        let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+        // SAFETY: the last submission was waited for, so pool, buffer and queries are free.
+        unsafe {
+            device.reset_command_pool(self.pool, Default::default()).context("vkResetCommandPool")?;
+            device.begin_command_buffer(self.buffer, &begin).context("vkBeginCommandBuffer")?;
+            device.cmd_reset_query_pool(self.buffer, self.queries, 0, 2 * MAX_TIMED);
+        }
+        let mut recorder = Recorder { commands: self, timed: Vec::new() };
+        record(&mut recorder);
+        let timed = recorder.timed;
+        let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
+        let submit = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
+        // SAFETY: recording has ended; everything recorded is borrowed by the caller until this returns, which is after the
+        // fence. `&mut self` and the single queue of a single-threaded renderer keep submissions apart.
+        unsafe {
+            device.end_command_buffer(self.buffer).context("vkEndCommandBuffer")?;
+            device.queue_submit2(self.gpu.queue, &submit, self.fence).context("vkQueueSubmit2")?;
+            device.wait_for_fences(&[self.fence], true, u64::MAX).context("vkWaitForFences")?;
+            device.reset_fences(&[self.fence]).context("vkResetFences")?;
+        }
+        self.times(&timed)
+    }
+
+    fn times(&self, timed: &[&'static str]) -> Result<Vec<PassTime>> {
+        let bits = self.gpu.info().timestamp_bits;
+        if bits == 0 || timed.is_empty() {
+            return Ok(timed.iter().map(|&name| PassTime { name, gpu_ms: None }).collect());
+        }
+        let mut ticks = vec![0_u64; 2 * timed.len()];
+        let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
+        // SAFETY: these queries were written by the submission that was just waited for.
+        unsafe { self.gpu.device.get_query_pool_results(self.queries, 0, &mut ticks, flags) }
+            .context("vkGetQueryPoolResults")?;
+        let mask = u64::MAX >> (64 - bits);
+        let period = f64::from(self.gpu.info().limits.timestamp_period);
+        let span = |pair: &[u64]| (pair[1].wrapping_sub(pair[0]) & mask) as f64 * period * 1e-6;
+        Ok(timed.iter().zip(ticks.chunks(2)).map(|(&name, pair)| PassTime { name, gpu_ms: Some(span(pair)) }).collect())
+    }
+
+    /// A storage buffer that holds `data`.
+    pub fn upload_buffer<T: NoUninit>(&mut self, name: &str, data: &[T]) -> Result<Buffer> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
+        let mut buffer =
+            Buffer::new(&self.gpu, &BufferDesc { name, size: bytes.len() as u64, usage: BufferUse::Storage })?;
+        if !bytes.is_empty() && !buffer.write(bytes) {
+            let staging = self.staging(name, bytes)?;
+            self.run(|cmd| cmd.copy_buffer(&staging, &buffer))?;
+        }
+        Ok(buffer)
+    }
+
+    /// An image of `desc` that holds `texels`, row after row.
+    pub fn upload_image(&mut self, desc: &ImageDesc<'_>, texels: &[u8]) -> Result<Image> {
+        let image = Image::new(&self.gpu, desc)?;
+        let rows = self.rows_at_once(&image);
+        let row_bytes = (image.texel_bytes() * u64::from(image.width())) as usize;
+        for (first, band) in (0..).step_by(rows as usize).zip(texels.chunks(row_bytes * rows as usize)) {
+            let staging = self.staging(desc.name, band)?;
+            let count = (band.len() / row_bytes) as u32;
+            self.run(|cmd| cmd.copy_to_rows(&staging, &image, first, count))?;
+        }
+        Ok(image)
+    }
+
+    /// The texels of `image`, row after row.
+    pub fn read_image(&mut self, image: &Image) -> Result<Vec<u8>> {
+        let rows = self.rows_at_once(image);
+        let row_bytes = image.texel_bytes() * u64::from(image.width());
+        let desc = BufferDesc { name: "readback", size: row_bytes * u64::from(rows), usage: BufferUse::Readback };
+        let buffer = Buffer::new(&self.gpu, &desc)?;
+        let mut texels = Vec::with_capacity((row_bytes * u64::from(image.height())) as usize);
+        for first in (0..image.height()).step_by(rows as usize) {
+            let count = rows.min(image.height() - first);
+            self.run(|cmd| cmd.copy_from_rows(image, first, count, &buffer))?;
+            texels.extend_from_slice(&buffer.bytes()[..(row_bytes * u64::from(count)) as usize]);
+        }
+        Ok(texels)
+    }
+
+    /// Large images travel in bands, so that a copy of the whole is never needed.
+    fn rows_at_once(&self, image: &Image) -> u32 {
+        const BAND: u64 = 16 << 20;
+        let row_bytes = image.texel_bytes() * u64::from(image.width());
+        (BAND / row_bytes).clamp(1, u64::from(image.height())) as u32
+    }
+
+    fn staging(&self, name: &str, bytes: &[u8]) -> Result<Buffer> {
+        let desc = BufferDesc { name: &format!("{name} on its way"), size: bytes.len() as u64, usage: BufferUse::Upload };
+        let mut staging = Buffer::new(&self.gpu, &desc)?;
+        if !staging.write(bytes) {
+            let result = vk::Result::ERROR_MEMORY_MAP_FAILED;
+            return Err(GpuError::Call { call: "vkMapMemory", result });
+        }
+        Ok(staging)
+    }
+}
+
+impl Drop for Commands {
+    fn drop(&mut self) {
+        // SAFETY: every submission was waited for, or the device was lost.
+        unsafe {
+            self.gpu.device.destroy_query_pool(self.queries, None);
+            self.gpu.device.destroy_fence(self.fence, None);
+            self.gpu.device.destroy_command_pool(self.pool, None);
+        }
+    }
+}
+
+/// A recording under way.
+pub struct Recorder<'a> {
+    commands: &'a Commands,
+    timed: Vec<&'static str>,
+}
+
+/// A target of a render pass.
+#[derive(Clone, Copy)]
+pub struct Target<'a> {
+    /// The image.
+    pub image: &'a Image,
+    /// What it holds at first: this, or `None` for what it held before.
+    pub clear: Option<[f32; 4]>,
+}
+
+impl Recorder<'_> {
+    fn device(&self) -> &ash::Device {
+        &self.commands.gpu.device
+    }
+
+    /// Times what `record` records, under a name.
+    pub fn timed(&mut self, name: &'static str, record: impl FnOnce(&mut Self)) {
+        let index = self.timed.len() as u32;
+        let (buffer, queries) = (self.commands.buffer, self.commands.queries);
+        let clock = index < MAX_TIMED && self.commands.gpu.info().timestamp_bits > 0;
+        if clock {
+            self.timed.push(name);
+        }
+        let stamp = |recorder: &Self, query| {
+            if clock {
+                // SAFETY: the query was reset when recording began, and is written once.
+                unsafe {
+                    recorder.device().cmd_write_timestamp2(buffer, vk::PipelineStageFlags2::ALL_COMMANDS, queries, query);
+                }
+            }
+        };
+        stamp(self, 2 * index);
+        record(self);
+        stamp(self, 2 * index + 1);
+    }
+
+    /// Waits for the last use of `image`, then makes it ready for `next`.
+    pub fn use_image(&mut self, image: &Image, next: Use) {
+        self.change_use(image, image.replace_use(next), next);
+    }
+
+    /// As [`use_image`](Self::use_image), for a use that overwrites all of the content.
+    pub fn overwrite_image(&mut self, image: &Image, next: Use) {
+        let before = image.replace_use(next);
+        let ((src_stage, src_access), (dst_stage, dst_access)) = (before.access(), next.access());
+        self.barrier(image, (src_stage, src_access, Use::Nothing), (dst_stage, dst_access, next));
+    }
+
+    fn change_use(&mut self, image: &Image, before: Use, next: Use) {
+        let ((src_stage, src_access), (dst_stage, dst_access)) = (before.access(), next.access());
+        self.barrier(image, (src_stage, src_access, before), (dst_stage, dst_access, next));
+    }
+
+    fn barrier(
+        &mut self,
+        image: &Image,
+        (src_stage, src_access, before): (vk::PipelineStageFlags2, vk::AccessFlags2, Use),
+        (dst_stage, dst_access, next): (vk::PipelineStageFlags2, vk::AccessFlags2, Use),
+    ) {
+        let barriers = [vk::ImageMemoryBarrier2::default()
+            .src_stage_mask(src_stage)
+            .src_access_mask(src_access)
+            .dst_stage_mask(dst_stage)
+            .dst_access_mask(dst_access)
+            .old_layout(before.layout())
+            .new_layout(next.layout())
+            .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
+            .image(image.handle)
+            .subresource_range(image.range())];
+        let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
+        // SAFETY: the image is alive, and its layout is that of its last use, which `Image` keeps.
+        unsafe { self.device().cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+    }
+
+    /// Draws into `colors` and `depth`, which are all of one size.
+    pub fn render(&mut self, colors: &[Target<'_>], depth: Option<Target<'_>>, draw: impl FnOnce(&mut RenderPass<'_>)) {
+        let mut attach = |target: &Target<'_>, next: Use| {
+            let mut info = vk::RenderingAttachmentInfo::default()
+                .image_view(target.image.view)
+                .image_layout(next.layout())
+                .load_op(vk::AttachmentLoadOp::LOAD)
+                .store_op(vk::AttachmentStoreOp::STORE);
+            match target.clear {
+                Some(value) => {
+                    self.overwrite_image(target.image, next);
+                    info = info.load_op(vk::AttachmentLoadOp::CLEAR).clear_value(match next {
+                        Use::DepthTarget => vk::ClearValue {
+                            depth_stencil: vk::ClearDepthStencilValue { depth: value[0], stencil: 0 },
+                        },
+                        _ => vk::ClearValue { color: vk::ClearColorValue { float32: value } },
+                    });
+                }
+                None => self.use_image(target.image, next),
+            }
+            info
+        };
+        let color_infos: Vec<_> = colors.iter().map(|target| attach(target, Use::ColorTarget)).collect();
+        let depth_info = depth.as_ref().map(|target| attach(target, Use::DepthTarget));
+        let Some(extent) = colors.iter().chain(&depth).map(|target| target.image.extent).next() else { return };
+        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent };
+        let mut info =
+            vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color_infos);
+        if let Some(depth) = &depth_info {
+            info = info.depth_attachment(depth);
+        }
+        // Upside down: Vulkan's rows grow downwards, the camera's up points up.
+        let viewport = vk::Viewport {
+            x: 0.0,
+            y: extent.height as f32,
+            width: extent.width as f32,
+            height: -(extent.height as f32),
+            min_depth: 0.0,
+            max_depth: 1.0,
+        };
+        let (device, buffer) = (self.device(), self.commands.buffer);
+        // SAFETY: the targets are alive and in the layouts named; begin and end enclose what `draw` records.
+        unsafe {
+            device.cmd_begin_rendering(buffer, &info);
+            device.cmd_set_viewport(buffer, 0, &[viewport]);
+            device.cmd_set_scissor(buffer, 0, &[area]);
+            draw(&mut RenderPass { commands: self.commands, bound: None });
+            device.cmd_end_rendering(buffer);
+        }
+    }
+
+    /// Runs a compute shader over `groups` workgroups.
+    pub fn dispatch<P: NoUninit>(&mut self, pipeline: &ComputePipeline, group: &BindGroup, push: &P, groups: [u32; 3]) {
+        let point = vk::PipelineBindPoint::COMPUTE;
+        bind(self.commands, pipeline.inner(), point, group);
+        push_constants(self.commands, pipeline.inner(), push);
+        // SAFETY: pipeline, set and push constants are bound.
+        unsafe { self.device().cmd_dispatch(self.commands.buffer, groups[0], groups[1], groups[2]) };
+    }
+
+    /// Makes what shaders wrote into buffers visible to copies, and what was copied visible to shaders.
+    pub fn wait_for_buffers(&mut self) {
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        let barriers = [vk::MemoryBarrier2::default()
+            .src_stage_mask(Stage::COMPUTE_SHADER | Stage::COPY)
+            .src_access_mask(Access::SHADER_STORAGE_WRITE | Access::TRANSFER_WRITE)
+            .dst_stage_mask(Stage::ALL_COMMANDS)
+            .dst_access_mask(Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE | Access::TRANSFER_READ)];
+        let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
+        // SAFETY: a barrier names no resource.
+        unsafe { self.device().cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+    }
+
+    /// Copies as much as both hold.
+    pub fn copy_buffer(&mut self, from: &Buffer, to: &Buffer) {
+        let region = [vk::BufferCopy::default().size(from.size.min(to.size))];
+        // SAFETY: both are alive and of at least that size.
+        unsafe { self.device().cmd_copy_buffer(self.commands.buffer, from.handle, to.handle, &region) };
+        self.wait_for_buffers();
+        self.make_visible_to_host();
+    }
+
+    fn copy_to_rows(&mut self, from: &Buffer, to: &Image, first: u32, count: u32) {
+        self.use_image(to, Use::CopyTarget);
+        let region = [rows(to, first, count)];
+        // SAFETY: the buffer holds `count` rows; the image is in the layout named.
+        unsafe {
+            let layout = vk::ImageLayout::TRANSFER_DST_OPTIMAL;
+            self.device().cmd_copy_buffer_to_image(self.commands.buffer, from.handle, to.handle, layout, &region);
+        }
+    }
+
+    fn copy_from_rows(&mut self, from: &Image, first: u32, count: u32, to: &Buffer) {
+        self.use_image(from, Use::CopySource);
+        let region = [rows(from, first, count)];
+        // SAFETY: the buffer has room for `count` rows; the image is in the layout named.
+        unsafe {
+            let layout = vk::ImageLayout::TRANSFER_SRC_OPTIMAL;
+            self.device().cmd_copy_image_to_buffer(self.commands.buffer, from.handle, layout, to.handle, &region);
+        }
+        self.make_visible_to_host();
+    }
+
+    fn make_visible_to_host(&mut self) {
+        let barriers = [vk::MemoryBarrier2::default()
+            .src_stage_mask(vk::PipelineStageFlags2::COPY)
+            .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
+            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
+            .dst_access_mask(vk::AccessFlags2::HOST_READ)];
+        let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
+        // SAFETY: a barrier names no resource.
+        unsafe { self.device().cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+    }
+}
+
+/// Rows of an image, packed in a buffer.
+fn rows(image: &Image, first: u32, count: u32) -> vk::BufferImageCopy {
+    let range = image.range();
+    vk::BufferImageCopy::default()
+        .image_subresource(vk::ImageSubresourceLayers {
+            aspect_mask: range.aspect_mask,
+            mip_level: 0,
+            base_array_layer: 0,
+            layer_count: 1,
+        })
+        .image_offset(vk::Offset3D { x: 0, y: first as i32, z: 0 })
+        .image_extent(vk::Extent3D { width: image.extent.width, height: count, depth: 1 })
+}
+
+/// Draws inside of [`Recorder::render`].
+pub struct RenderPass<'a> {
+    commands: &'a Commands,
+    bound: Option<vk::PipelineLayout>,
+}
+
+impl RenderPass<'_> {
+    /// The pipeline and the resources of the draws that follow.
+    pub fn bind(&mut self, pipeline: &GraphicsPipeline, group: &BindGroup) {
+        bind(self.commands, pipeline.inner(), vk::PipelineBindPoint::GRAPHICS, group);
+        self.bound = Some(pipeline.inner().layout);
+    }
+
+    /// Draws `vertices` vertices; nothing if no pipeline is bound.
+    pub fn draw<P: NoUninit>(&mut self, push: &P, vertices: u32) {
+        let Some(layout) = self.bound else { return };
+        let device = &self.commands.gpu.device;
+        // SAFETY: a pipeline with this layout is bound inside of a rendering.
+        unsafe {
+            let bytes = bytemuck::bytes_of(push);
+            if !bytes.is_empty() {
+                device.cmd_push_constants(self.commands.buffer, layout, vk::ShaderStageFlags::ALL, 0, bytes);
+            }
+            device.cmd_draw(self.commands.buffer, vertices, 1, 0, 0);
+        }
+    }
+}
+
+fn bind(commands: &Commands, pipeline: &Pipeline, point: vk::PipelineBindPoint, group: &BindGroup) {
+    // SAFETY: pipeline and set are alive, and made for one another.
+    unsafe {
+        let device = &commands.gpu.device;
+        device.cmd_bind_pipeline(commands.buffer, point, pipeline.handle);
+        device.cmd_bind_descriptor_sets(commands.buffer, point, pipeline.layout, 0, &[group.set], &[]);
+    }
+}
+
+fn push_constants<P: NoUninit>(commands: &Commands, pipeline: &Pipeline, push: &P) {
+    let bytes = bytemuck::bytes_of(push);
+    if !bytes.is_empty() {
+        // SAFETY: the layout has a range of these bytes for every stage.
+        unsafe {
+            let device = &commands.gpu.device;
+            device.cmd_push_constants(commands.buffer, pipeline.layout, vk::ShaderStageFlags::ALL, 0, bytes);
+        }
+    }
+}

@@ -1,0 +1,139 @@
+//! A device, opened: its queue, its memory, its name.
+
+use std::ffi::{CStr, CString};
+use std::mem::ManuallyDrop;
+use std::ops::Deref;
+use std::sync::{Arc, Mutex};
+
+use ash::{ext, vk};
+use gpu_allocator::AllocationSizes;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+
+use super::error::Context;
+use super::memory::Ledger;
+use super::{DeviceInfo, GpuError, Instance, Result};
+
+/// A device, shared by everything made on it. Cheap to clone.
+#[derive(Clone)]
+pub struct Gpu(Arc<Open>);
+
+/// What a [`Gpu`] refers to. Handles are destroyed in [`Drop`], before the fields, the instance among them.
+pub struct Open {
+    pub(super) device: ash::Device,
+    pub(super) queue: vk::Queue,
+    pub(super) allocator: ManuallyDrop<Mutex<Allocator>>,
+    pub(super) ledger: Mutex<Ledger>,
+    names: Option<ext::debug_utils::Device>,
+    info: DeviceInfo,
+    instance: Arc<Instance>,
+}
+
+impl Deref for Gpu {
+    type Target = Open;
+
+    fn deref(&self) -> &Open {
+        &self.0
+    }
+}
+
+impl Gpu {
+    /// Opens the device that was [chosen](Instance::choose).
+    pub fn open(instance: &Arc<Instance>, info: DeviceInfo) -> Result<Self> {
+        let priorities = [1.0];
+        let queues =
+            [vk::DeviceQueueCreateInfo::default().queue_family_index(info.queue_family).queue_priorities(&priorities)];
+        let mut vulkan13 =
+            vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true);
+        // SAFETY: the device was enumerated from this instance.
+        let extensions = unsafe { instance.handle.enumerate_device_extension_properties(info.handle) }
+            .context("vkEnumerateDeviceExtensionProperties")?;
+        // A device that is not a full Vulkan implementation says so, and wants it to be acknowledged.
+        const PORTABILITY: &CStr = ash::khr::portability_subset::NAME;
+        let subset = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(PORTABILITY));
+        let enabled = if subset { vec![PORTABILITY.as_ptr()] } else { Vec::new() };
+        let create =
+            vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&enabled).push_next(&mut vulkan13);
+        // SAFETY: the features and the queue family were found on this device; the pointers are to locals.
+        let device =
+            unsafe { instance.handle.create_device(info.handle, &create, None) }.context("vkCreateDevice")?;
+        // SAFETY: queue 0 of that family was just created.
+        let queue = unsafe { device.get_device_queue(info.queue_family, 0) };
+
+        const MIB: u64 = 1 << 20;
+        let allocator = Allocator::new(&AllocatorCreateDesc {
+            instance: instance.handle.clone(),
+            device: device.clone(),
+            physical_device: info.handle,
+            debug_settings: Default::default(),
+            buffer_device_address: false,
+            // Small blocks: on a CPU device they are the process's own memory.
+            allocation_sizes: AllocationSizes::new(8 * MIB, 8 * MIB).with_max_device_memblock_size(64 * MIB),
+        });
+        let allocator = match allocator {
+            Ok(allocator) => allocator,
+            Err(error) => {
+                // SAFETY: nothing was made on the device yet.
+                unsafe { device.destroy_device(None) };
+                return Err(GpuError::OutOfMemory { what: "the allocator".into(), bytes: 0, state: error.to_string() });
+            }
+        };
+        let names = instance.validates().then(|| ext::debug_utils::Device::new(&instance.handle, &device));
+        Ok(Self(Arc::new(Open {
+            device,
+            queue,
+            allocator: ManuallyDrop::new(Mutex::new(allocator)),
+            ledger: Mutex::default(),
+            names,
+            info,
+            instance: Arc::clone(instance),
+        })))
+    }
+
+    /// What is known of the device.
+    pub fn info(&self) -> &DeviceInfo {
+        &self.info
+    }
+
+    /// The instance that it was found by.
+    pub fn instance(&self) -> &Arc<Instance> {
+        &self.instance
+    }
+
+    /// The most bytes of device memory that were held at one time.
+    pub fn peak_bytes(&self) -> u64 {
+        self.lock_ledger().peak
+    }
+
+    /// The longest side of an image.
+    pub fn max_image_side(&self) -> u32 {
+        self.info.limits.max_image_dimension2_d.min(self.info.limits.max_framebuffer_width)
+    }
+
+    /// The name of `handle` in messages of the validation layer and in RenderDoc.
+    pub(super) fn name(&self, handle: impl vk::Handle, name: &str) {
+        let (Some(names), Ok(name)) = (&self.names, CString::new(name)) else { return };
+        let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(handle).object_name(&name);
+        // SAFETY: the handle belongs to this device and is alive. A name that could not be set is only missed in messages.
+        let _ = unsafe { names.set_debug_utils_object_name(&info) };
+    }
+}
+
+impl Open {
+    /// Bytes of the largest heap.
+    pub(super) fn heap(&self) -> u64 {
+        self.info.memory
+    }
+}
+
+impl Drop for Open {
+    fn drop(&mut self) {
+        // SAFETY: buffers, images and pipelines hold the `Gpu`, so none is left; the allocator frees its blocks while the
+        // device lives, and is not used again. The instance, a field, goes after this.
+        unsafe {
+            // A device that was lost is idle.
+            let _ = self.device.device_wait_idle();
+            ManuallyDrop::drop(&mut self.allocator);
+            self.device.destroy_device(None);
+        }
+    }
+}

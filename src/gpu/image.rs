@@ -1,0 +1,206 @@
+//! Images, and what they are being used for.
+
+use std::sync::{Mutex, PoisonError};
+
+use ash::vk::{self, Format};
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::Allocation;
+
+use super::error::Context;
+use super::{Gpu, GpuError, Result};
+
+/// What an image is used for next. [`Recorder::use_image`](super::Recorder::use_image) waits for the use before.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Use {
+    /// Its content is not needed.
+    Nothing,
+    /// A colour target of a render pass.
+    ColorTarget,
+    /// The depth target of a render pass.
+    DepthTarget,
+    /// Read by shaders.
+    Sampled,
+    /// Read and written by compute shaders.
+    Storage,
+    /// Copied from.
+    CopySource,
+    /// Copied to.
+    CopyTarget,
+}
+
+impl Use {
+    pub(super) fn layout(self) -> vk::ImageLayout {
+        match self {
+            Self::Nothing => vk::ImageLayout::UNDEFINED,
+            Self::ColorTarget => vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL,
+            Self::DepthTarget => vk::ImageLayout::DEPTH_ATTACHMENT_OPTIMAL,
+            Self::Sampled => vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL,
+            Self::Storage => vk::ImageLayout::GENERAL,
+            Self::CopySource => vk::ImageLayout::TRANSFER_SRC_OPTIMAL,
+            Self::CopyTarget => vk::ImageLayout::TRANSFER_DST_OPTIMAL,
+        }
+    }
+
+    /// The stages that touch the image, and how.
+    pub(super) fn access(self) -> (vk::PipelineStageFlags2, vk::AccessFlags2) {
+        use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        match self {
+            Self::Nothing => (Stage::NONE, Access::NONE),
+            Self::ColorTarget => (
+                Stage::COLOR_ATTACHMENT_OUTPUT,
+                Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE,
+            ),
+            Self::DepthTarget => (
+                Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS,
+                Access::DEPTH_STENCIL_ATTACHMENT_READ | Access::DEPTH_STENCIL_ATTACHMENT_WRITE,
+            ),
+            Self::Sampled => (Stage::FRAGMENT_SHADER | Stage::COMPUTE_SHADER, Access::SHADER_SAMPLED_READ),
+            Self::Storage => (
+                Stage::COMPUTE_SHADER,
+                Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE,
+            ),
+            Self::CopySource => (Stage::COPY, Access::TRANSFER_READ),
+            Self::CopyTarget => (Stage::COPY, Access::TRANSFER_WRITE),
+        }
+    }
+
+    fn flag(self) -> vk::ImageUsageFlags {
+        use vk::ImageUsageFlags as Flags;
+        match self {
+            Self::Nothing => Flags::empty(),
+            Self::ColorTarget => Flags::COLOR_ATTACHMENT,
+            Self::DepthTarget => Flags::DEPTH_STENCIL_ATTACHMENT,
+            Self::Sampled => Flags::SAMPLED,
+            Self::Storage => Flags::STORAGE,
+            Self::CopySource => Flags::TRANSFER_SRC,
+            Self::CopyTarget => Flags::TRANSFER_DST,
+        }
+    }
+}
+
+/// How an image is made.
+#[derive(Clone, Copy, Debug)]
+pub struct ImageDesc<'a> {
+    /// Its name in messages.
+    pub name: &'a str,
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// Its texels.
+    pub format: Format,
+    /// Everything that it will be used for.
+    pub uses: &'a [Use],
+}
+
+/// A two-dimensional image on the device, without mip levels.
+pub struct Image {
+    pub(super) handle: vk::Image,
+    pub(super) view: vk::ImageView,
+    pub(super) format: Format,
+    pub(super) extent: vk::Extent2D,
+    /// The use of the last recording; recordings execute in the order in which they are made.
+    current: Mutex<Use>,
+    allocation: Option<Allocation>,
+    gpu: Gpu,
+}
+
+impl Image {
+    /// An image without content.
+    pub fn new(gpu: &Gpu, desc: &ImageDesc<'_>) -> Result<Self> {
+        let limit = gpu.max_image_side();
+        if desc.width.max(desc.height) > limit {
+            return Err(GpuError::TooLarge {
+                what: desc.name.into(),
+                size: format!("{}x{} pixels", desc.width, desc.height),
+                limit: format!("{limit} a side"),
+                advice: "use a smaller one",
+            });
+        }
+        let extent = vk::Extent2D { width: desc.width, height: desc.height };
+        let info = vk::ImageCreateInfo::default()
+            .image_type(vk::ImageType::TYPE_2D)
+            .format(desc.format)
+            .extent(extent.into())
+            .mip_levels(1)
+            .array_layers(1)
+            .samples(vk::SampleCountFlags::TYPE_1)
+            .tiling(vk::ImageTiling::OPTIMAL)
+            .usage(desc.uses.iter().fold(vk::ImageUsageFlags::empty(), |flags, usage| flags | usage.flag()));
+        // SAFETY: the size is within the device's limits; every format that Vitrum names is one that Vulkan guarantees for
+        // its uses.
+        let handle = unsafe { gpu.device.create_image(&info, None) }.context("vkCreateImage")?;
+        // From here on, dropping `image` cleans up; a null view is ignored then.
+        let mut image = Self {
+            handle,
+            view: vk::ImageView::null(),
+            format: desc.format,
+            extent,
+            current: Mutex::new(Use::Nothing),
+            allocation: None,
+            gpu: gpu.clone(),
+        };
+        gpu.name(handle, desc.name);
+        // SAFETY: the image was just made on this device.
+        let requirements = unsafe { gpu.device.get_image_memory_requirements(handle) };
+        let allocation = gpu.allocate(desc.name, requirements, MemoryLocation::GpuOnly, /* linear: */ false)?;
+        // SAFETY: memory and offset come from the allocator for these very requirements; bound once, and kept until the
+        // image is destroyed.
+        let bound = unsafe { gpu.device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
+        image.allocation = Some(allocation);
+        bound.context("vkBindImageMemory")?;
+        let view = vk::ImageViewCreateInfo::default()
+            .image(handle)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(desc.format)
+            .subresource_range(image.range());
+        // SAFETY: the image is bound to memory, and the view names its own format and its only level.
+        image.view = unsafe { gpu.device.create_image_view(&view, None) }.context("vkCreateImageView")?;
+        gpu.name(image.view, desc.name);
+        Ok(image)
+    }
+
+    /// Columns.
+    pub fn width(&self) -> u32 {
+        self.extent.width
+    }
+
+    /// Rows.
+    pub fn height(&self) -> u32 {
+        self.extent.height
+    }
+
+    /// The only level and layer.
+    pub(super) fn range(&self) -> vk::ImageSubresourceRange {
+        let depth = self.format == Format::D32_SFLOAT;
+        let aspect_mask = if depth { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
+        vk::ImageSubresourceRange { aspect_mask, base_mip_level: 0, level_count: 1, base_array_layer: 0, layer_count: 1 }
+    }
+
+    /// Bytes of one texel.
+    pub(super) fn texel_bytes(&self) -> u64 {
+        match self.format {
+            Format::R32G32B32A32_SFLOAT => 16,
+            Format::R16G16B16A16_SFLOAT => 8,
+            _ => 4,
+        }
+    }
+
+    /// The use before, replaced by `next`.
+    pub(super) fn replace_use(&self, next: Use) -> Use {
+        std::mem::replace(&mut *self.current.lock().unwrap_or_else(PoisonError::into_inner), next)
+    }
+}
+
+impl Drop for Image {
+    fn drop(&mut self) {
+        // SAFETY: `Commands::run` waits, so no recording that names this image is still executing; the view goes first.
+        unsafe {
+            self.gpu.device.destroy_image_view(self.view, None);
+            self.gpu.device.destroy_image(self.handle, None);
+        }
+        if let Some(allocation) = self.allocation.take() {
+            self.gpu.free(allocation);
+        }
+    }
+}

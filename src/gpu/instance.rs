@@ -1,0 +1,308 @@
+//! The Vulkan instance: which devices there are, and what the validation layer says.
+
+use std::ffi::{CStr, c_void};
+use std::fmt;
+use std::sync::{Arc, Mutex, PoisonError};
+
+use ash::{ext, vk};
+
+use super::error::Context;
+use super::{GpuError, Result};
+
+const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
+
+/// What the validation layer has said.
+#[derive(Debug, Default)]
+pub struct Messages(Mutex<Vec<String>>);
+
+impl Messages {
+    /// Every message so far, oldest first.
+    pub fn all(&self) -> Vec<String> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
+    }
+
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).len()
+    }
+
+    fn push(&self, message: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(message);
+    }
+}
+
+/// The Vulkan loader, opened.
+pub struct Instance {
+    pub(super) handle: ash::Instance,
+    debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    messages: Arc<Messages>,
+    // Last: the functions of everything above live in its library.
+    _entry: ash::Entry,
+}
+
+/// What kind of device it is, from the fastest to the slowest expected.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DeviceKind {
+    /// A GPU of its own
+    Discrete,
+    /// A GPU inside the processor
+    Integrated,
+    /// A GPU of a virtual machine
+    Virtual,
+    /// The processor itself
+    Cpu,
+    /// None of these
+    Other,
+}
+
+impl fmt::Display for DeviceKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(match self {
+            Self::Discrete => "discrete",
+            Self::Integrated => "integrated",
+            Self::Virtual => "virtual",
+            Self::Cpu => "cpu",
+            Self::Other => "other",
+        })
+    }
+}
+
+/// A device found, and what it can do.
+#[derive(Clone, Debug)]
+pub struct DeviceInfo {
+    pub(super) handle: vk::PhysicalDevice,
+    pub(super) queue_family: u32,
+    pub(super) limits: vk::PhysicalDeviceLimits,
+    pub(super) timestamp_bits: u32,
+    /// Position in the list of devices, for `--device`.
+    pub index: usize,
+    /// The device's own name.
+    pub name: String,
+    /// Name and version of its driver.
+    pub driver: String,
+    /// The version of Vulkan that it speaks.
+    pub api: String,
+    /// What kind of device it is.
+    pub kind: DeviceKind,
+    /// Its largest heap in bytes.
+    pub memory: u64,
+    /// `VK_KHR_acceleration_structure` and `VK_KHR_ray_query` are there.
+    pub ray_query: bool,
+    /// What Vitrum needs and it lacks; empty: it can be used.
+    pub missing: Vec<String>,
+}
+
+impl Instance {
+    /// Opens the loader; with `validation`, under the validation layer with synchronization validation.
+    pub fn new(validation: bool) -> Result<Arc<Self>> {
+        // SAFETY: the loader is the system's own library; its initialisers are those of every Vulkan program.
+        let entry = unsafe { ash::Entry::load() }.map_err(GpuError::NoLoader)?;
+        // SAFETY: no arguments.
+        let version = unsafe { entry.try_enumerate_instance_version() }
+            .context("vkEnumerateInstanceVersion")?
+            .unwrap_or(vk::API_VERSION_1_0);
+        if version < vk::API_VERSION_1_3 {
+            return Err(GpuError::OldLoader { found: version_text(version) });
+        }
+
+        let application = vk::ApplicationInfo::default()
+            .application_name(c"vitrum")
+            .engine_name(c"vitrum")
+            .api_version(vk::API_VERSION_1_3);
+        let mut extensions = Vec::new();
+        // SAFETY: no layer is named.
+        let available = unsafe { entry.enumerate_instance_extension_properties(None) }
+            .context("vkEnumerateInstanceExtensionProperties")?;
+        let has = |name: &CStr| available.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let portability = has(ash::khr::portability_enumeration::NAME);
+        if portability {
+            extensions.push(ash::khr::portability_enumeration::NAME.as_ptr());
+        }
+
+        let messages = Arc::new(Messages::default());
+        let mut layers = Vec::new();
+        let mut messenger = messenger_info(&messages);
+        let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
+        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        let mut info = vk::InstanceCreateInfo::default().application_info(&application);
+        if validation {
+            // SAFETY: no arguments.
+            let found = unsafe { entry.enumerate_instance_layer_properties() }
+                .context("vkEnumerateInstanceLayerProperties")?;
+            if !found.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION)) {
+                return Err(GpuError::NoValidationLayer);
+            }
+            layers.push(VALIDATION.as_ptr());
+            extensions.push(ext::debug_utils::NAME.as_ptr());
+            extensions.push(ext::validation_features::NAME.as_ptr());
+            info = info.push_next(&mut messenger).push_next(&mut features);
+        }
+        if portability {
+            info = info.flags(vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR);
+        }
+        let info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions);
+        // SAFETY: every pointer in `info` is to a local that outlives the call.
+        let handle = unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
+            vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::NoDevice,
+            result => GpuError::Call { call: "vkCreateInstance", result },
+        })?;
+
+        let mut instance = Self { handle, debug: None, messages, _entry: entry };
+        if validation {
+            let debug = ext::debug_utils::Instance::new(&instance._entry, &instance.handle);
+            let info = messenger_info(&instance.messages);
+            // SAFETY: the callback's user data is the `Messages` that this instance holds until it is destroyed.
+            let messenger = unsafe { debug.create_debug_utils_messenger(&info, None) }
+                .context("vkCreateDebugUtilsMessengerEXT")?;
+            instance.debug = Some((debug, messenger));
+        }
+        Ok(Arc::new(instance))
+    }
+
+    /// What the validation layer says; it outlives the instance, so that messages of its end are seen too.
+    pub fn messages(&self) -> Arc<Messages> {
+        Arc::clone(&self.messages)
+    }
+
+    pub(super) fn validates(&self) -> bool {
+        self.debug.is_some()
+    }
+
+    /// Every device of every driver, in the loader's order.
+    pub fn devices(&self) -> Result<Vec<DeviceInfo>> {
+        // SAFETY: the instance is alive.
+        let handles = unsafe { self.handle.enumerate_physical_devices() }.or_else(|result| match result {
+            // The loader's word for drivers that all failed to start.
+            vk::Result::ERROR_INITIALIZATION_FAILED => Ok(Vec::new()),
+            result => Err(result),
+        });
+        let handles = handles.context("vkEnumeratePhysicalDevices")?;
+        handles.into_iter().enumerate().map(|(index, handle)| self.inspect(index, handle)).collect()
+    }
+
+    /// The device of that index or with that in its name (in any case); `None`: the best one.
+    pub fn choose(&self, wanted: Option<&str>) -> Result<DeviceInfo> {
+        let devices = self.devices()?;
+        if devices.is_empty() {
+            return Err(GpuError::NoDevice);
+        }
+        let Some(wanted) = wanted else {
+            let lacking = |d: &DeviceInfo| format!("{:?} lacks {}", d.name, d.missing.join(", "));
+            let all: Vec<_> = devices.iter().map(lacking).collect();
+            return devices
+                .into_iter()
+                .filter(|device| device.missing.is_empty())
+                .min_by_key(|device| device.kind)
+                .ok_or(GpuError::NoUsableDevice(all));
+        };
+        let found = devices.iter().map(|d| format!("{} ({})", d.index, d.name)).collect();
+        let name = wanted.to_lowercase();
+        let device = devices
+            .into_iter()
+            .find(|d| wanted.parse() == Ok(d.index) || (!name.is_empty() && d.name.to_lowercase().contains(&name)))
+            .ok_or(GpuError::UnknownDevice { wanted: wanted.into(), found })?;
+        if !device.missing.is_empty() {
+            return Err(GpuError::Lacking { name: device.name, missing: device.missing });
+        }
+        Ok(device)
+    }
+
+    fn inspect(&self, index: usize, handle: vk::PhysicalDevice) -> Result<DeviceInfo> {
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+        let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
+        // SAFETY: `handle` was enumerated from this instance. A device older than 1.3 ignores structs that it does not know,
+        // and what stays false then reads as missing.
+        let (families, memory, extensions) = unsafe {
+            self.handle.get_physical_device_properties2(handle, &mut properties);
+            self.handle.get_physical_device_features2(handle, &mut features);
+            (
+                self.handle.get_physical_device_queue_family_properties(handle),
+                self.handle.get_physical_device_memory_properties(handle),
+                self.handle.enumerate_device_extension_properties(handle),
+            )
+        };
+        let extensions = extensions.context("vkEnumerateDeviceExtensionProperties")?;
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let properties = properties.properties;
+        let work = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
+        let queue_family = families.iter().position(|family| family.queue_flags.contains(work));
+
+        let mut missing = Vec::new();
+        if properties.api_version < vk::API_VERSION_1_3 {
+            missing.push(format!("Vulkan 1.3 (it has {})", version_text(properties.api_version)));
+        }
+        for (there, name) in [
+            (vulkan13.dynamic_rendering == vk::TRUE, "the feature dynamicRendering"),
+            (vulkan13.synchronization2 == vk::TRUE, "the feature synchronization2"),
+            (queue_family.is_some(), "a queue for graphics and compute"),
+        ] {
+            if !there {
+                missing.push(name.into());
+            }
+        }
+        let text = |text: Result<&CStr, _>| text.map_or(String::new(), |text| text.to_string_lossy().into_owned());
+        Ok(DeviceInfo {
+            handle,
+            queue_family: queue_family.unwrap_or(0) as u32,
+            limits: properties.limits,
+            timestamp_bits: queue_family.map_or(0, |family| families[family].timestamp_valid_bits),
+            index,
+            name: text(properties.device_name_as_c_str()),
+            driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
+            api: version_text(properties.api_version),
+            kind: match properties.device_type {
+                vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+                vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+                vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+                vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+                _ => DeviceKind::Other,
+            },
+            memory: memory.memory_heaps_as_slice().iter().map(|heap| heap.size).max().unwrap_or(0),
+            ray_query: has(ash::khr::acceleration_structure::NAME) && has(ash::khr::ray_query::NAME),
+            missing,
+        })
+    }
+}
+
+impl Drop for Instance {
+    fn drop(&mut self) {
+        // SAFETY: devices hold this instance, so none is left; the messenger goes before the instance that made it.
+        unsafe {
+            if let Some((debug, messenger)) = self.debug.take() {
+                debug.destroy_debug_utils_messenger(messenger, None);
+            }
+            self.handle.destroy_instance(None);
+        }
+    }
+}
+
+fn messenger_info(messages: &Arc<Messages>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
+    use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
+    vk::DebugUtilsMessengerCreateInfoEXT::default()
+        .message_severity(Severity::WARNING | Severity::ERROR)
+        .message_type(Type::VALIDATION | Type::PERFORMANCE)
+        .pfn_user_callback(Some(record))
+        .user_data(Arc::as_ptr(messages).cast_mut().cast())
+}
+
+/// Called by the layer, on whichever thread called Vulkan.
+unsafe extern "system" fn record(
+    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _types: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    messages: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer passes valid data, and `messages` is the `Messages` that the instance keeps alive.
+    let (data, messages) = unsafe { (&*data, &*messages.cast::<Messages>()) };
+    // SAFETY: the layer's text is a C string for the length of this call, or null.
+    let text = unsafe { data.message_as_c_str() };
+    messages.push(text.map_or(String::new(), |text| text.to_string_lossy().into_owned()));
+    vk::FALSE
+}
+
+fn version_text(version: u32) -> String {
+    let part = (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
+    format!("{}.{}.{}", part.0, part.1, part.2)
+}

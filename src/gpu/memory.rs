@@ -1,0 +1,164 @@
+//! Buffers, and how much memory is held.
+
+use std::sync::{MutexGuard, PoisonError};
+
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+use super::device::Open;
+use super::error::Context;
+use super::{Gpu, GpuError, Result};
+
+/// Bytes held by allocations.
+#[derive(Debug, Default)]
+pub struct Ledger {
+    now: u64,
+    pub(super) peak: u64,
+}
+
+impl Open {
+    pub(super) fn lock_ledger(&self) -> MutexGuard<'_, Ledger> {
+        self.ledger.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Memory for one resource. The driver's word is not waited for where the largest heap is plainly too small: a CPU device
+    /// would hand out memory that the system does not have.
+    pub(super) fn allocate(
+        &self,
+        name: &str,
+        requirements: vk::MemoryRequirements,
+        location: MemoryLocation,
+        linear: bool,
+    ) -> Result<Allocation> {
+        let out_of_memory = |state| GpuError::OutOfMemory { what: name.into(), bytes: requirements.size, state };
+        let mut ledger = self.lock_ledger();
+        let heap = self.heap();
+        if ledger.now.saturating_add(requirements.size) > heap {
+            let state = format!("{} of {} MiB are in use", ledger.now >> 20, heap >> 20);
+            return Err(out_of_memory(state));
+        }
+        let allocation = self
+            .allocator
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .allocate(&AllocationCreateDesc {
+                name,
+                requirements,
+                location,
+                linear,
+                allocation_scheme: AllocationScheme::GpuAllocatorManaged,
+            })
+            .map_err(|error| out_of_memory(format!("the driver says: {error}")))?;
+        ledger.now += allocation.size();
+        ledger.peak = ledger.peak.max(ledger.now);
+        Ok(allocation)
+    }
+
+    pub(super) fn free(&self, allocation: Allocation) {
+        self.lock_ledger().now -= allocation.size();
+        // It fails only for an allocation of another allocator.
+        let _ = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation);
+    }
+}
+
+/// What a buffer is for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum BufferUse {
+    /// Read and written by shaders.
+    Storage,
+    /// Written by the host, copied from by the device.
+    Upload,
+    /// Copied to by the device, read by the host.
+    Readback,
+}
+
+/// How a buffer is made.
+#[derive(Clone, Copy, Debug)]
+pub struct BufferDesc<'a> {
+    /// Its name in messages.
+    pub name: &'a str,
+    /// Its size in bytes; 0 makes one of 4, since Vulkan knows no empty buffer.
+    pub size: u64,
+    /// What it is for.
+    pub usage: BufferUse,
+}
+
+/// Bytes on the device.
+pub struct Buffer {
+    pub(super) handle: vk::Buffer,
+    pub(super) size: u64,
+    allocation: Option<Allocation>,
+    gpu: Gpu,
+}
+
+impl Buffer {
+    /// An uninitialised buffer.
+    pub fn new(gpu: &Gpu, desc: &BufferDesc<'_>) -> Result<Self> {
+        let size = desc.size.max(4);
+        let limit = u64::from(gpu.info().limits.max_storage_buffer_range);
+        if desc.usage == BufferUse::Storage && size > limit {
+            return Err(GpuError::TooLarge {
+                what: format!("the buffer of {}", desc.name),
+                size: format!("{} MiB", size >> 20),
+                limit: format!("{} MiB", limit >> 20),
+                advice: "use smaller meshes",
+            });
+        }
+        // A CPU device's memory is the host's: nothing is gained by a copy.
+        let near = if gpu.info().kind == super::DeviceKind::Cpu { MemoryLocation::CpuToGpu } else { MemoryLocation::GpuOnly };
+        use vk::BufferUsageFlags as Flags;
+        let (flags, location) = match desc.usage {
+            BufferUse::Storage => (Flags::STORAGE_BUFFER | Flags::TRANSFER_DST | Flags::TRANSFER_SRC, near),
+            BufferUse::Upload => (Flags::TRANSFER_SRC, MemoryLocation::CpuToGpu),
+            BufferUse::Readback => (Flags::TRANSFER_DST, MemoryLocation::GpuToCpu),
+        };
+        let info = vk::BufferCreateInfo::default().size(size).usage(flags);
+        // SAFETY: the device is alive; the size is not 0.
+        let handle = unsafe { gpu.device.create_buffer(&info, None) }.context("vkCreateBuffer")?;
+        // From here on, dropping `buffer` cleans up.
+        let mut buffer = Self { handle, size, allocation: None, gpu: gpu.clone() };
+        gpu.name(handle, desc.name);
+        // SAFETY: the buffer was just made on this device.
+        let requirements = unsafe { gpu.device.get_buffer_memory_requirements(handle) };
+        let allocation = gpu.allocate(desc.name, requirements, location, /* linear: */ true)?;
+        // SAFETY: memory and offset come from the allocator for these very requirements; bound once, and kept until the
+        // buffer is destroyed.
+        let bound = unsafe { gpu.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+        buffer.allocation = Some(allocation);
+        bound.context("vkBindBufferMemory")?;
+        Ok(buffer)
+    }
+
+    /// Size in bytes.
+    pub fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// Writes from the start; false if the host cannot see this memory.
+    pub(super) fn write(&mut self, bytes: &[u8]) -> bool {
+        match self.allocation.as_mut().and_then(Allocation::mapped_slice_mut) {
+            Some(memory) if bytes.len() <= memory.len() => {
+                memory[..bytes.len()].copy_from_slice(bytes);
+                true
+            }
+            _ => false,
+        }
+    }
+
+    /// What the device has copied here; empty unless made for [`BufferUse::Readback`].
+    pub fn bytes(&self) -> &[u8] {
+        let memory = self.allocation.as_ref().and_then(Allocation::mapped_slice);
+        memory.map_or(&[], |memory| &memory[..self.size as usize])
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: `Commands::run` waits, so no recording that names this buffer is still executing.
+        unsafe { self.gpu.device.destroy_buffer(self.handle, None) };
+        if let Some(allocation) = self.allocation.take() {
+            self.gpu.free(allocation);
+        }
+    }
+}

@@ -1,0 +1,32 @@
+//! Vulkan 1.3 behind a safe face: the only room of the house with `unsafe`.
+//!
+//! In flow descriptions and bytes, out flow bytes and times. [`Instance`] finds devices, [`Gpu`] is one of them opened;
+//! [`Buffer`], [`Image`], [`BindGroup`] and the pipelines live on it, and [`Commands`] records, submits and waits.
+//! Everything holds its [`Gpu`], so no device goes before what was made on it, and [`Commands::run`] returns only when the
+//! device is done, so nothing that a recording borrows can go while it is in use.
+
+mod bind_group;
+mod commands;
+mod device;
+mod error;
+mod image;
+mod instance;
+mod memory;
+mod pipeline;
+mod shader;
+mod shared;
+
+pub use ash::vk::Format;
+pub use bind_group::{Bind, BindGroup};
+pub use commands::{Commands, PassTime, Recorder, RenderPass, Target};
+pub use device::Gpu;
+pub use error::GpuError;
+pub use image::{Image, ImageDesc, Use};
+pub use instance::{DeviceInfo, DeviceKind, Instance, Messages};
+pub use memory::{Buffer, BufferDesc, BufferUse};
+pub use pipeline::{ComputePipeline, Depth, GraphicsPipeline, GraphicsPipelineDesc, Specialization};
+pub use shader::{Shader, compiled as shaders};
+pub use shared::{Frame, InstanceRecord, LightRecord, MaterialRecord, Matrix4x3, SamplePush};
+
+/// What can go wrong here.
+pub type Result<T, E = GpuError> = std::result::Result<T, E>;

@@ -1,0 +1,96 @@
+//! The host's side of `shaders/shared.glsl`: the same structs, member by member.
+
+use bytemuck::{Pod, Zeroable};
+use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
+
+/// An affine map as GLSL's `mat4x3` lies in a buffer: four columns of three, each padded to four.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+pub struct Matrix4x3([[f32; 4]; 4]);
+
+impl From<DAffine3> for Matrix4x3 {
+    fn from(map: DAffine3) -> Self {
+        let column = |v: DVec3| [v.x as f32, v.y as f32, v.z as f32, 0.0];
+        let linear = map.matrix3;
+        Self([column(linear.x_axis), column(linear.y_axis), column(linear.z_axis), column(map.translation)])
+    }
+}
+
+impl From<DMat3> for Matrix4x3 {
+    fn from(linear: DMat3) -> Self {
+        DAffine3::from_mat3(linear).into()
+    }
+}
+
+/// `Frame`: what is the same for every sample of a picture.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "shared.glsl describes the members")]
+pub struct Frame {
+    pub view_projection: [[f32; 4]; 4],
+    pub ray_corner: Vec3,
+    pub light_count: u32,
+    pub ray_right: Vec3,
+    pub environment_turn: f32,
+    pub ray_down: Vec3,
+    pub environment_visible: u32,
+    pub environment_radiance: Vec3,
+    pub reflection_red: f32,
+    pub reflection_intensity: f32,
+    pub transmission_green: f32,
+    pub transmission_intensity: f32,
+    pub flipped_ratio: u32,
+}
+
+impl Frame {
+    /// `matrix` as a shader's `mat4`.
+    pub fn columns(matrix: DMat4) -> [[f32; 4]; 4] {
+        matrix.as_mat4().to_cols_array_2d()
+    }
+}
+
+/// `Instance`: a mesh in its place.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "shared.glsl describes the members")]
+pub struct InstanceRecord {
+    pub object_to_world: Matrix4x3,
+    pub normal_to_world: Matrix4x3,
+    pub ray_origin: Vec3,
+    pub first_triangle: u32,
+    pub world_to_object: Matrix4x3,
+    pub first_vertex: u32,
+    pub material: u32,
+    pub smooth_normals: u32,
+    pub number: u32,
+}
+
+/// `Material`: a dielectric.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "shared.glsl describes the members")]
+pub struct MaterialRecord {
+    pub refraction_index: f32,
+    pub roughness: f32,
+}
+
+/// `Light`: a point light.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "shared.glsl describes the members")]
+pub struct LightRecord {
+    pub position: Vec3,
+    pub padding: f32,
+    pub intensity: Vec3,
+    pub padding2: f32,
+}
+
+/// `Push`: what changes from draw to draw.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
+#[expect(missing_docs, reason = "shared.glsl describes the members")]
+pub struct SamplePush {
+    pub jitter: Vec2,
+    pub clip_offset: Vec2,
+    pub instance_index: u32,
+}

@@ -1,0 +1,30 @@
+//! Vitrum renders glass: raw Vulkan, GLSL shaders, and a scene that says which effects are simulated.
+//!
+//! The data flows through the modules in this order:
+//!
+//! ```text
+//! scene file -> scene -> effects needed -> plan -> GPU resources -> passes -> image -> report
+//! ```
+//!
+//! [`scene`] is plain data without a Vulkan type, [`effects`] the table of what can be simulated, [`plan`] what one
+//! render does, [`gpu`] the only room with `unsafe`, [`passes`] the frame, [`image`] pixels and their files,
+//! [`report`] what is told about a render, [`commands`] what the binary offers. [`optics`] states in 64-bit
+//! arithmetic what `shaders/` computes in 32.
+
+#![deny(unsafe_code)]
+#![warn(missing_docs)]
+
+pub mod commands;
+pub mod effects;
+pub mod error;
+#[allow(unsafe_code)]
+pub mod gpu;
+pub mod image;
+pub mod optics;
+pub mod options;
+pub mod passes;
+pub mod plan;
+pub mod report;
+pub mod scene;
+
+pub use error::{Error, Result};

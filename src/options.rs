@@ -1,0 +1,346 @@
+//! The options of a render: one struct for the command line and the scene's `[render]` table, one for what they amount to.
+
+use std::path::PathBuf;
+use std::str::FromStr;
+
+use serde::Deserialize;
+
+use crate::effects::Selection;
+
+/// A light transport model: how far the light is followed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Model {
+    /// The original: rasterised, one interface, reflection and refraction see the environment only
+    Single,
+    /// Rasterised, front and back interface
+    Double,
+    /// The whole tree of reflections and refractions, enumerated
+    Tree,
+    /// Monte Carlo path tracing, the reference
+    Path,
+}
+
+impl Model {
+    /// The name on the command line and in the stats.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "single",
+            Self::Double => "double",
+            Self::Tree => "tree",
+            Self::Path => "path",
+        }
+    }
+}
+
+/// The curve from scene-linear radiance to display values, for PNG only.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Tonemap {
+    /// Clipped at 1
+    None,
+    /// Khronos PBR Neutral: colours kept up to 0.8, highlights rolled off
+    #[default]
+    Neutral,
+    /// AgX: a filmic curve that desaturates highlights
+    Agx,
+}
+
+impl Tonemap {
+    /// The name on the command line and in image metadata.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::None => "none",
+            Self::Neutral => "neutral",
+            Self::Agx => "agx",
+        }
+    }
+}
+
+/// How rays find surfaces.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Trace {
+    /// Ray queries of the device
+    Hardware,
+    /// A traversal written in the shader
+    Software,
+}
+
+/// An extra layer of the EXR.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Aov {
+    /// Shading normal in world space
+    Normal,
+    /// Distance from the camera in metres, 0 where nothing is hit
+    Depth,
+    /// Base colour
+    Albedo,
+    /// Number of the object in the scene file, from 1; 0 where nothing is hit
+    Object,
+    /// Scattering events per pixel
+    Interfaces,
+    /// Throughput that `tree` cut off
+    Discarded,
+    /// Standard error of a Monte Carlo mean
+    Stderr,
+}
+
+impl Aov {
+    /// The name of the layer.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Normal => "normal",
+            Self::Depth => "depth",
+            Self::Albedo => "albedo",
+            Self::Object => "object",
+            Self::Interfaces => "interfaces",
+            Self::Discarded => "discarded",
+            Self::Stderr => "stderr",
+        }
+    }
+}
+
+/// Width and height in pixels, both from 1.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(try_from = "[u32; 2]")]
+pub struct Size {
+    /// Columns.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+}
+
+impl TryFrom<[u32; 2]> for Size {
+    type Error = String;
+
+    fn try_from([width, height]: [u32; 2]) -> Result<Self, String> {
+        if width == 0 || height == 0 {
+            return Err(format!("size {width}x{height} is empty; both sides must be at least 1"));
+        }
+        Ok(Self { width, height })
+    }
+}
+
+impl FromStr for Size {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (width, height) = text.split_once(['x', 'X']).ok_or("expected WIDTHxHEIGHT, as in 1024x768")?;
+        let side = |side: &str| side.parse().map_err(|_| format!("{side:?} is not a number of pixels"));
+        Self::try_from([side(width)?, side(height)?])
+    }
+}
+
+impl std::fmt::Display for Size {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}x{}", self.width, self.height)
+    }
+}
+
+/// A rule for values, used by the command line and by scene files alike.
+macro_rules! rules {
+    ($($name:ident: $type:ty, $ok:expr, $wanted:literal;)*) => {
+        mod command_line {
+            $(pub fn $name(text: &str) -> Result<$type, String> {
+                let value: $type = text.parse().map_err(|_| format!("expected {}", $wanted))?;
+                super::rule::$name(value)
+            })*
+        }
+        mod rule {
+            $(pub fn $name(value: $type) -> Result<$type, String> {
+                let ok: fn($type) -> bool = $ok;
+                if ok(value) { Ok(value) } else { Err(format!("expected {}, found {value}", $wanted)) }
+            })*
+        }
+        mod file {
+            use serde::{Deserialize, Deserializer, de::Error};
+            $(pub fn $name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<$type>, D::Error> {
+                super::rule::$name(<$type>::deserialize(deserializer)?).map(Some).map_err(D::Error::custom)
+            })*
+        }
+    };
+}
+
+rules! {
+    samples: u32, |x| (1..=1 << 20).contains(&x), "1 to 1048576 samples";
+    max_depth: u32, |x| (1..=1 << 16).contains(&x), "a depth from 1 to 65536";
+    positive: f64, |x| x > 0.0 && x.is_finite(), "a number above 0";
+    unit: f64, |x| (0.0..=1.0).contains(&x), "a number from 0 to 1";
+    exposure: f64, |x| (-64.0..=64.0).contains(&x), "an exposure from -64 to 64 EV";
+}
+
+/// Options of `render` as given: on the command line, or in the scene's `[render]` table with `_` for `-`.
+///
+/// What is `None` was not given; [`RenderArgs::or`] joins two of them.
+#[derive(Clone, Debug, Default, PartialEq, clap::Args, Deserialize)]
+#[serde(default, deny_unknown_fields)]
+pub struct RenderArgs {
+    /// Light transport model [default: single]
+    #[arg(long, value_name = "NAME")]
+    pub model: Option<Model>,
+
+    /// Size of the image in pixels [default: 1024x768]
+    #[arg(long, value_name = "WxH")]
+    pub size: Option<Size>,
+
+    /// Samples per pixel [default: 16; path: 256]
+    #[arg(long, value_name = "N", value_parser = command_line::samples)]
+    #[serde(deserialize_with = "file::samples")]
+    pub samples: Option<u32>,
+
+    /// Longest chain of interfaces [default: 32]
+    #[arg(long, value_name = "N", value_parser = command_line::max_depth)]
+    #[serde(deserialize_with = "file::max_depth")]
+    pub max_depth: Option<u32>,
+
+    /// Stop when the estimated relative error of the image is below X
+    #[arg(long, value_name = "X", value_parser = command_line::positive)]
+    #[serde(deserialize_with = "file::positive")]
+    pub tolerance: Option<f64>,
+
+    /// The best image within that time
+    #[arg(long, value_name = "SECONDS", value_parser = command_line::positive)]
+    #[serde(deserialize_with = "file::positive")]
+    pub time_budget: Option<f64>,
+
+    /// Seed of everything random [default: 0]
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u64>,
+
+    /// Effects simulated: auto (those that the scene calls for), all, or a list; -name takes one away [default: auto]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    pub effects: Option<Selection>,
+
+    /// Index of refraction of every dielectric
+    #[arg(long, value_name = "X", value_parser = command_line::positive)]
+    #[serde(deserialize_with = "file::positive")]
+    pub ior: Option<f64>,
+
+    /// Roughness of every dielectric, 0 to 1
+    #[arg(long, value_name = "X", value_parser = command_line::unit)]
+    #[serde(deserialize_with = "file::unit")]
+    pub roughness: Option<f64>,
+
+    /// Environment image in place of the scene's
+    #[arg(long, value_name = "FILE")]
+    pub env: Option<PathBuf>,
+
+    /// Exposure of a PNG in stops [default: 0]
+    #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = command_line::exposure)]
+    #[serde(deserialize_with = "file::exposure")]
+    pub exposure: Option<f64>,
+
+    /// Tone curve of a PNG [default: neutral]
+    #[arg(long, value_name = "NAME")]
+    pub tonemap: Option<Tonemap>,
+
+    /// Extra layers in the EXR
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    pub aov: Option<Vec<Aov>>,
+
+    /// Vulkan device: part of its name, its index, or "list" [default: the best one]
+    #[arg(long, value_name = "NAME|INDEX|list", env = "VITRUM_DEVICE")]
+    pub device: Option<String>,
+
+    /// How rays are traced [default: hardware on a GPU with ray queries, else software]
+    #[arg(long, value_name = "HOW")]
+    pub trace: Option<Trace>,
+
+    /// Tints the transmission green (model single) [default: 0]
+    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
+    #[serde(deserialize_with = "file::unit")]
+    pub transmission_green: Option<f64>,
+
+    /// Tints the reflection red (model single) [default: 0]
+    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
+    #[serde(deserialize_with = "file::unit")]
+    pub reflection_red: Option<f64>,
+
+    /// Blends the transmission in, 0 to 1 (model single) [default: 1]
+    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
+    #[serde(deserialize_with = "file::unit")]
+    pub transmission_intensity: Option<f64>,
+
+    /// Blends the reflection in, 0 to 1 (model single) [default: 1]
+    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
+    #[serde(deserialize_with = "file::unit")]
+    pub reflection_intensity: Option<f64>,
+
+    /// Flips the ratio of the indices where the transmitted direction is computed (model single)
+    #[arg(long, num_args = 0..=1, default_missing_value = "true", value_name = "BOOL", help_heading = "Debug controls of the original model")]
+    pub flipped_ratio: Option<bool>,
+}
+
+impl RenderArgs {
+    /// These options, and `fallback`'s where these are silent.
+    #[must_use]
+    pub fn or(self, fallback: Self) -> Self {
+        Self {
+            model: self.model.or(fallback.model),
+            size: self.size.or(fallback.size),
+            samples: self.samples.or(fallback.samples),
+            max_depth: self.max_depth.or(fallback.max_depth),
+            tolerance: self.tolerance.or(fallback.tolerance),
+            time_budget: self.time_budget.or(fallback.time_budget),
+            seed: self.seed.or(fallback.seed),
+            effects: self.effects.or(fallback.effects),
+            ior: self.ior.or(fallback.ior),
+            roughness: self.roughness.or(fallback.roughness),
+            env: self.env.or(fallback.env),
+            exposure: self.exposure.or(fallback.exposure),
+            tonemap: self.tonemap.or(fallback.tonemap),
+            aov: self.aov.or(fallback.aov),
+            device: self.device.or(fallback.device),
+            trace: self.trace.or(fallback.trace),
+            transmission_green: self.transmission_green.or(fallback.transmission_green),
+            reflection_red: self.reflection_red.or(fallback.reflection_red),
+            transmission_intensity: self.transmission_intensity.or(fallback.transmission_intensity),
+            reflection_intensity: self.reflection_intensity.or(fallback.reflection_intensity),
+            flipped_ratio: self.flipped_ratio.or(fallback.flipped_ratio),
+        }
+    }
+}
+
+/// The debug controls of the original's user interface; they act in the model `single` alone.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct DebugControls {
+    /// Green added to the transmission.
+    pub transmission_green: f32,
+    /// Red added to the reflection.
+    pub reflection_red: f32,
+    /// Factor of the transmission.
+    pub transmission_intensity: f32,
+    /// Factor of the reflection.
+    pub reflection_intensity: f32,
+    /// The transmitted direction is built with the inverse ratio of the indices, as in the report's figure 3.
+    pub flipped_ratio: bool,
+}
+
+impl Default for DebugControls {
+    fn default() -> Self {
+        Self {
+            transmission_green: 0.0,
+            reflection_red: 0.0,
+            transmission_intensity: 1.0,
+            reflection_intensity: 1.0,
+            flipped_ratio: false,
+        }
+    }
+}
+
+impl DebugControls {
+    /// What `args` amounts to.
+    pub fn new(args: &RenderArgs) -> Self {
+        let neutral = Self::default();
+        let or = |given: Option<f64>, neutral: f32| given.map_or(neutral, |x| x as f32);
+        Self {
+            transmission_green: or(args.transmission_green, neutral.transmission_green),
+            reflection_red: or(args.reflection_red, neutral.reflection_red),
+            transmission_intensity: or(args.transmission_intensity, neutral.transmission_intensity),
+            reflection_intensity: or(args.reflection_intensity, neutral.reflection_intensity),
+            flipped_ratio: args.flipped_ratio.unwrap_or(neutral.flipped_ratio),
+        }
+    }
+}

@@ -1,0 +1,80 @@
+//! From the sum of all samples to what a screen shows.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::Targets;
+use crate::gpu::{
+    Bind, BindGroup, Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
+    Specialization, Target, Use, shaders,
+};
+use crate::plan::Plan;
+
+/// Encoded by the shader, so that the tone curve sees the same values on every kind of target.
+const DISPLAY: Format = Format::R8G8B8A8_UNORM;
+
+pub(super) struct Display {
+    pipeline: GraphicsPipeline,
+}
+
+/// `Push` of `shaders/display.frag`.
+#[repr(C)]
+#[derive(Clone, Copy, Pod, Zeroable)]
+struct Push {
+    scale: f32,
+    curve: u32,
+}
+
+pub(super) fn group(gpu: &Gpu, total: &Image) -> Result<BindGroup> {
+    BindGroup::new(gpu, "display", &[Bind::Sampled(total)])
+}
+
+impl Display {
+    pub(super) fn new(gpu: &Gpu, targets: &Targets) -> Result<Self> {
+        let pipeline = GraphicsPipeline::new(
+            gpu,
+            &GraphicsPipelineDesc {
+                name: "display",
+                vertex: &shaders::FULLSCREEN_VERT,
+                fragment: &shaders::DISPLAY_FRAG,
+                group: &targets.display,
+                push_bytes: size_of::<Push>() as u32,
+                colors: &[DISPLAY],
+                depth: Depth::Ignored,
+                specialization: &Specialization::default(),
+            },
+        )?;
+        Ok(Self { pipeline })
+    }
+
+    /// sRGB values of every pixel, and the time of the pass.
+    pub(super) fn run(
+        &self,
+        commands: &mut Commands,
+        targets: &Targets,
+        plan: &Plan,
+        samples: u32,
+    ) -> Result<(Vec<[u8; 4]>, Vec<PassTime>)> {
+        let screen = Image::new(
+            commands.gpu(),
+            &ImageDesc {
+                name: "display",
+                width: targets.total.width(),
+                height: targets.total.height(),
+                format: DISPLAY,
+                uses: &[Use::ColorTarget, Use::CopySource],
+            },
+        )?;
+        let push = Push { scale: (plan.exposure.exp2() / f64::from(samples)) as f32, curve: plan.tonemap as u32 };
+        let time = commands.run(|cmd| {
+            cmd.timed("display", |cmd| {
+                cmd.use_image(&targets.total, Use::Sampled);
+                cmd.render(&[Target { image: &screen, clear: Some([0.0; 4]) }], None, |pass| {
+                    pass.bind(&self.pipeline, &targets.display);
+                    pass.draw(&push, 3);
+                });
+            });
+        })?;
+        let texels = commands.read_image(&screen)?;
+        Ok((bytemuck::allocation::pod_collect_to_vec(&texels), time))
+    }
+}

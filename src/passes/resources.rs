@@ -1,0 +1,209 @@
+//! The scene on the device.
+
+use std::rc::Rc;
+
+use glam::{DAffine3, DMat3, DVec3, Vec3};
+use half::f16;
+
+use super::view::View;
+use crate::effects::Effect;
+use crate::gpu::{
+    Bind, BindGroup, Buffer, Commands, Format, Frame, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord, Result,
+    Specialization, Use,
+};
+use crate::plan::Plan;
+use crate::scene::{Dielectric, Mesh, Panorama, Scene, Surface, Surroundings};
+
+/// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
+const ENVIRONMENT_IMAGE: u32 = 64;
+
+/// Buffers and images that every pass sees, as one group. The buffers are held so that the group stays valid.
+pub(super) struct Resources {
+    pub(super) group: Rc<BindGroup>,
+    /// Vertices of each instance.
+    pub(super) draws: Vec<u32>,
+    pub(super) specialization: Specialization,
+    /// From lengths on the device to metres.
+    pub(super) metres_per_unit: f64,
+    held: Rc<(Vec<Buffer>, Image)>,
+}
+
+impl Resources {
+    pub(super) fn new(commands: &mut Commands, scene: &Scene, plan: &Plan) -> Result<Self> {
+        let view = View::new(&scene.camera, scene.bounds(), plan.size);
+        let geometry = Geometry::new(scene, &view);
+        let materials: Vec<_> = scene.materials.iter().map(|material| material_record(&material.surface)).collect();
+        let lights = lights(scene, &view);
+        let frame = frame(scene, plan, &view, lights.len() as u32);
+        let (environment, specialization) = match &scene.environment.light {
+            Surroundings::Image(panorama) => (upload_panorama(commands, panorama)?, true),
+            Surroundings::Color(_) => (upload_panorama(commands, &Panorama::uniform(Vec3::ONE))?, false),
+        };
+        let buffers = vec![
+            commands.upload_buffer("frame", &[frame])?,
+            commands.upload_buffer("instances", &geometry.instances)?,
+            commands.upload_buffer("materials", &materials)?,
+            commands.upload_buffer("lights", &lights)?,
+            commands.upload_buffer("positions", &geometry.positions)?,
+            commands.upload_buffer("normals", &geometry.normals)?,
+            commands.upload_buffer("triangles", &geometry.triangles)?,
+        ];
+        commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
+        let mut bindings: Vec<_> = buffers.iter().map(Bind::Buffer).collect();
+        bindings.push(Bind::Sampled(&environment));
+        let group = BindGroup::new(commands.gpu(), "scene", &bindings)?;
+        Ok(Self {
+            group: Rc::new(group),
+            draws: geometry.draws,
+            specialization: Specialization::effects(plan.effects).with(ENVIRONMENT_IMAGE, specialization),
+            metres_per_unit: 1.0 / view.units_per_metre,
+            held: Rc::new((buffers, environment)),
+        })
+    }
+
+    /// The same with one triangle an instance, to run pipelines for the first time.
+    pub(super) fn few(&self) -> Self {
+        Self {
+            group: Rc::clone(&self.group),
+            draws: self.draws.iter().take(1).map(|&count| count.min(3)).collect(),
+            specialization: self.specialization.clone(),
+            metres_per_unit: self.metres_per_unit,
+            held: Rc::clone(&self.held),
+        }
+    }
+}
+
+/// Every mesh once, and the instances of them that are dielectrics.
+#[derive(Default)]
+struct Geometry {
+    positions: Vec<f32>,
+    normals: Vec<f32>,
+    triangles: Vec<u32>,
+    instances: Vec<InstanceRecord>,
+    draws: Vec<u32>,
+}
+
+impl Geometry {
+    fn new(scene: &Scene, view: &View) -> Self {
+        let mut all = Self::default();
+        let places: Vec<_> = scene.meshes.iter().map(|mesh| all.add(mesh)).collect();
+        let to_device = DAffine3::from_scale(DVec3::splat(view.units_per_metre)) * DAffine3::from_translation(-view.position);
+        for object in &scene.objects {
+            if matches!(scene.materials[object.material].surface, Surface::Opaque(_)) {
+                continue;
+            }
+            let mesh = &scene.meshes[object.mesh];
+            let place = &places[object.mesh];
+            let object_to_world = to_device * object.transform * place.to_mesh;
+            let world_to_object = object_to_world.inverse();
+            all.instances.push(InstanceRecord {
+                object_to_world: object_to_world.into(),
+                normal_to_world: world_to_object.matrix3.transpose().into(),
+                ray_origin: world_to_object.translation.as_vec3(),
+                first_triangle: place.first_triangle,
+                world_to_object: DMat3::into(world_to_object.matrix3),
+                first_vertex: place.first_vertex,
+                material: object.material as u32,
+                smooth_normals: u32::from(object.smooth && !mesh.normals.is_empty()),
+                number: object.number as u32 + 1,
+            });
+            all.draws.push(3 * mesh.triangles.len() as u32);
+        }
+        all
+    }
+
+    fn add(&mut self, mesh: &Mesh) -> Place {
+        let bounds = mesh.bounds();
+        let center = bounds.center();
+        // A power of two, so that scaling rounds nothing.
+        let scale = bounds.farthest(center).max(f64::MIN_POSITIVE).log2().ceil().exp2();
+        let place = Place {
+            first_vertex: (self.positions.len() / 3) as u32,
+            first_triangle: (self.triangles.len() / 3) as u32,
+            to_mesh: DAffine3::from_translation(center) * DAffine3::from_scale(DVec3::splat(scale)),
+        };
+        for &position in &mesh.positions {
+            let unit = (Vec3::from(position).as_dvec3() - center) / scale;
+            self.positions.extend(unit.as_vec3().to_array());
+        }
+        match mesh.normals.is_empty() {
+            // Never read, but vertices share one numbering.
+            true => self.normals.resize(self.positions.len(), 0.0),
+            false => self.normals.extend(mesh.normals.iter().flatten()),
+        }
+        self.triangles.extend(mesh.triangles.iter().flatten());
+        place
+    }
+}
+
+/// Where a mesh lies in the buffers, scaled to the unit ball; `to_mesh` undoes that.
+struct Place {
+    first_vertex: u32,
+    first_triangle: u32,
+    to_mesh: DAffine3,
+}
+
+fn material_record(surface: &Surface) -> MaterialRecord {
+    match surface {
+        Surface::Dielectric(Dielectric { ior, roughness, .. }) => {
+            MaterialRecord { refraction_index: *ior as f32, roughness: *roughness as f32 }
+        }
+        Surface::Opaque(_) => MaterialRecord::default(),
+    }
+}
+
+fn lights(scene: &Scene, view: &View) -> Vec<LightRecord> {
+    let scale = view.units_per_metre;
+    let record = |light: &crate::scene::PointLight| LightRecord {
+        position: ((light.position - view.position) * scale).as_vec3(),
+        // Irradiance is intensity over distance squared, and distances are scaled.
+        intensity: (light.intensity * scale * scale).as_vec3(),
+        ..LightRecord::default()
+    };
+    scene.lights.iter().map(record).collect()
+}
+
+fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
+    let environment = &scene.environment;
+    let radiance = match environment.light {
+        Surroundings::Image(_) => DVec3::splat(environment.intensity),
+        Surroundings::Color(color) => color * environment.intensity,
+    };
+    debug_assert_eq!(plan.effects.contains(Effect::DirectLight) && light_count == 0, false);
+    Frame {
+        view_projection: Frame::columns(view.view_projection),
+        ray_corner: view.ray_corner.as_vec3(),
+        light_count,
+        ray_right: view.ray_right.as_vec3(),
+        environment_turn: (environment.rotation / std::f64::consts::TAU).rem_euclid(1.0) as f32,
+        ray_down: view.ray_down.as_vec3(),
+        environment_visible: environment.visible.into(),
+        environment_radiance: radiance.as_vec3(),
+        reflection_red: plan.debug.reflection_red,
+        reflection_intensity: plan.debug.reflection_intensity,
+        transmission_green: plan.debug.transmission_green,
+        transmission_intensity: plan.debug.transmission_intensity,
+        flipped_ratio: plan.debug.flipped_ratio.into(),
+    }
+}
+
+/// In half precision where that loses nothing, as with images that came in it.
+fn upload_panorama(commands: &mut Commands, panorama: &Panorama) -> Result<Image> {
+    let is_half = |value: &f32| f16::from_f32(*value).to_f32() == *value;
+    let desc = ImageDesc {
+        name: "environment",
+        width: panorama.width,
+        height: panorama.height,
+        format: Format::R32G32B32A32_SFLOAT,
+        uses: &[Use::CopyTarget, Use::Sampled],
+    };
+    if panorama.texels.iter().flatten().all(is_half) {
+        let one = f16::ONE.to_bits();
+        let bits = |value: f32| f16::from_f32(value).to_bits();
+        let texels: Vec<[u16; 4]> = panorama.texels.iter().map(|&[r, g, b]| [bits(r), bits(g), bits(b), one]).collect();
+        let desc = ImageDesc { format: Format::R16G16B16A16_SFLOAT, ..desc };
+        return commands.upload_image(&desc, bytemuck::cast_slice(&texels));
+    }
+    let texels: Vec<[f32; 4]> = panorama.texels.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
+    commands.upload_image(&desc, bytemuck::cast_slice(&texels))
+}

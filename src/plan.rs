@@ -1,0 +1,90 @@
+//! What one render does: scene and options, with every default filled in and every conflict refused.
+
+use crate::effects::{Effect, Effects};
+use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap};
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// A render, decided.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// The light transport model.
+    pub model: Model,
+    /// Pixels.
+    pub size: Size,
+    /// Samples per pixel, or as many as the time allows.
+    pub budget: Budget,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Effects that are simulated.
+    pub effects: Effects,
+    /// Effects that were selected and that the model cannot honour.
+    pub unsupported: Effects,
+    /// Stops, for display values.
+    pub exposure: f64,
+    /// Tone curve, for display values.
+    pub tonemap: Tonemap,
+    /// Extra layers.
+    pub aovs: Vec<Aov>,
+    /// Controls of the original's user interface.
+    pub debug: DebugControls,
+}
+
+/// How much is spent.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Budget {
+    /// That many samples per pixel.
+    Samples(u32),
+    /// Samples until that many seconds have passed, and at most so many.
+    Seconds {
+        /// The time.
+        seconds: f64,
+        /// The most samples.
+        most: u32,
+    },
+}
+
+/// Samples that a time budget ends with at the latest.
+const MOST_SAMPLES: u32 = 1 << 20;
+
+impl Plan {
+    /// What `args` amount to for `scene`; the scene's own `[render]` table is not looked at, see [`RenderArgs::or`].
+    pub fn new(scene: &Scene, args: &RenderArgs) -> Result<Self> {
+        let model = args.model.unwrap_or(Model::Single);
+        if model != Model::Single {
+            let name = model.name();
+            return Err(Error::Usage(format!("--model {name}: this version has no such model yet; it has: single")));
+        }
+        if args.tolerance.is_some() {
+            let hint = "model single has no error estimate; use --samples or --time-budget";
+            return Err(Error::Usage(format!("--tolerance: {hint}")));
+        }
+        let mut aovs = args.aov.clone().unwrap_or_default();
+        aovs.sort();
+        aovs.dedup();
+        if let Some(aov) = aovs.iter().find(|aov| !matches!(aov, Aov::Normal | Aov::Depth | Aov::Object)) {
+            let name = aov.name();
+            return Err(Error::Usage(format!("--aov {name}: model single does not have it; it has: normal, depth, object")));
+        }
+        let budget = match args.time_budget {
+            Some(seconds) => Budget::Seconds { seconds, most: args.samples.unwrap_or(MOST_SAMPLES) },
+            None => Budget::Samples(args.samples.unwrap_or(16)),
+        };
+        let selected = args.effects.clone().unwrap_or_default().resolve(scene);
+        let share = |honoured: bool| -> Effects {
+            selected.iter().filter(|effect: &Effect| effect.honoured_by(model) == honoured).collect()
+        };
+        Ok(Self {
+            model,
+            size: args.size.unwrap_or(Size { width: 1024, height: 768 }),
+            budget,
+            seed: args.seed.unwrap_or(0),
+            effects: share(true),
+            unsupported: share(false),
+            exposure: args.exposure.unwrap_or(0.0),
+            tonemap: args.tonemap.unwrap_or_default(),
+            aovs,
+            debug: DebugControls::new(args),
+        })
+    }
+}

@@ -1,0 +1,5 @@
+//! What is told about a render.
+
+mod stats;
+
+pub use stats::{BuildTimes, DeviceStats, Stats};

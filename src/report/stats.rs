@@ -1,0 +1,108 @@
+//! The stats of a render, as JSON. What does not apply is null.
+
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::gpu::{DeviceInfo, PassTime};
+use crate::passes::Rendered;
+use crate::plan::Plan;
+use crate::scene::Scene;
+
+/// Schema 1 of `--stats`.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+pub struct Stats {
+    pub schema: u32,
+    pub vitrum: &'static str,
+    pub device: DeviceStats,
+    pub scene: String,
+    pub model: &'static str,
+    pub size: [u32; 2],
+    pub samples: u32,
+    pub max_depth: Option<u32>,
+    pub seed: u64,
+    pub effects: Vec<&'static str>,
+    pub unsupported: Vec<&'static str>,
+    pub trace: &'static str,
+    pub passes: Vec<PassStats>,
+    pub gpu_ms: Option<f64>,
+    pub build_ms: BuildTimes,
+    pub wall_ms: f64,
+    pub rays: Option<u64>,
+    pub peak_gpu_bytes: u64,
+    pub discarded: Option<()>,
+    pub stderr: Option<()>,
+    pub non_finite_pixels: usize,
+    pub validation_messages: Option<usize>,
+}
+
+/// Which device it was.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+pub struct DeviceStats {
+    pub name: String,
+    pub driver: String,
+    pub api: String,
+    #[serde(rename = "type")]
+    pub kind: String,
+}
+
+/// A pass, over all samples.
+#[derive(Clone, Debug, Serialize)]
+#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+pub struct PassStats {
+    pub name: &'static str,
+    pub gpu_ms: Option<f64>,
+}
+
+/// Host times before the first sample, in milliseconds.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+pub struct BuildTimes {
+    pub scene: f64,
+    pub acceleration: Option<f64>,
+    pub pipelines: f64,
+}
+
+impl Stats {
+    /// Those of one render that began at `start`; `load` is the time that it took to read the scene.
+    pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, start: Instant, load: Duration) -> Self {
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let passes: Vec<_> = rendered.passes.iter().map(|&PassTime { name, gpu_ms }| PassStats { name, gpu_ms }).collect();
+        let finite = |pixel: &&[f32; 3]| pixel.iter().all(|value| value.is_finite());
+        Self {
+            schema: 1,
+            vitrum: env!("CARGO_PKG_VERSION"),
+            device: DeviceStats {
+                name: device.name.clone(),
+                driver: device.driver.clone(),
+                api: device.api.clone(),
+                kind: device.kind.to_string(),
+            },
+            scene: scene.name.clone(),
+            model: plan.model.name(),
+            size: [plan.size.width, plan.size.height],
+            samples: rendered.samples,
+            max_depth: None,
+            seed: plan.seed,
+            effects: plan.effects.names(),
+            unsupported: plan.unsupported.names(),
+            trace: "none",
+            gpu_ms: passes.iter().map(|pass| pass.gpu_ms).sum(),
+            passes,
+            build_ms: BuildTimes {
+                scene: ms(load + rendered.upload),
+                acceleration: None,
+                pipelines: ms(rendered.pipelines),
+            },
+            wall_ms: ms(start.elapsed()),
+            rays: None,
+            peak_gpu_bytes: 0,
+            discarded: None,
+            stderr: None,
+            non_finite_pixels: rendered.radiance.len() - rendered.radiance.iter().filter(finite).count(),
+            validation_messages: None,
+        }
+    }
+}
