@@ -1,6 +1,6 @@
 //! What one render does: scene and options, with every default filled in and every conflict refused.
 
-use crate::effects::{Effect, Effects};
+use crate::effects::{Effect, Effects, Selection};
 use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap};
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -16,6 +16,8 @@ pub struct Plan {
     pub budget: Budget,
     /// Seed of everything random.
     pub seed: u64,
+    /// Which effects were asked for.
+    pub selection: Selection,
     /// Effects that are simulated.
     pub effects: Effects,
     /// Effects that were selected and that the model cannot honour.
@@ -70,7 +72,8 @@ impl Plan {
             Some(seconds) => Budget::Seconds { seconds, most: args.samples.unwrap_or(MOST_SAMPLES) },
             None => Budget::Samples(args.samples.unwrap_or(16)),
         };
-        let selected = args.effects.clone().unwrap_or_default().resolve(scene);
+        let selection = args.effects.clone().unwrap_or_default();
+        let selected = selection.resolve(scene);
         let share = |honoured: bool| -> Effects {
             selected.iter().filter(|effect: &Effect| effect.honoured_by(model) == honoured).collect()
         };
@@ -79,6 +82,7 @@ impl Plan {
             size: args.size.unwrap_or(Size { width: 1024, height: 768 }),
             budget,
             seed: args.seed.unwrap_or(0),
+            selection,
             effects: share(true),
             unsupported: share(false),
             exposure: args.exposure.unwrap_or(0.0),

@@ -43,7 +43,7 @@ impl Gpu {
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(info.queue_family).queue_priorities(&priorities)];
         let mut vulkan13 =
-            vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true);
+            vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true).maintenance4(true);
         // SAFETY: the device was enumerated from this instance.
         let extensions = unsafe { instance.handle.enumerate_device_extension_properties(info.handle) }
             .context("vkEnumerateDeviceExtensionProperties")?;

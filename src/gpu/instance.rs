@@ -236,6 +236,7 @@ impl Instance {
         for (there, name) in [
             (vulkan13.dynamic_rendering == vk::TRUE, "the feature dynamicRendering"),
             (vulkan13.synchronization2 == vk::TRUE, "the feature synchronization2"),
+            (vulkan13.maintenance4 == vk::TRUE, "the feature maintenance4"),
             (queue_family.is_some(), "a queue for graphics and compute"),
         ] {
             if !there {

@@ -3,6 +3,8 @@
 //!
 //! Indices are not swapped where a surface is seen from behind: the cosine is negative there.
 
+use std::f64::consts::PI;
+
 use glam::DVec3;
 
 /// Cosine of the transmitted angle by Snell's law, E(3); 0 where light is totally reflected. `eta_i_over_t` is the index on
@@ -42,6 +44,32 @@ pub fn transmission_dir(view_dir: DVec3, normal: DVec3, refraction_index: f64, f
     }
     let ratio = if flipped { refraction_index } else { eta_i_over_t };
     Some(ratio * -view_dir + (ratio * cos_theta_in - cos_theta_tr) * normal)
+}
+
+/// Distribution of microfacet normals, GGX, at the angle whose cosine is `cos_theta`: Walter et al. 2007, equation 33.
+pub fn distribution_ggx(cos_theta: f64, alpha: f64) -> f64 {
+    let sin_squared = 1.0 - cos_theta * cos_theta;
+    let ratio = alpha / (alpha * alpha * cos_theta * cos_theta + sin_squared);
+    ratio * ratio / PI
+}
+
+/// Smith's masking for GGX, one direction: Walter et al. 2007, equation 34.
+pub fn masking_ggx(cos_theta: f64, alpha: f64) -> f64 {
+    let tan_squared = 1.0 / (cos_theta * cos_theta) - 1.0;
+    2.0 / (1.0 + (1.0 + alpha * alpha * tan_squared).sqrt())
+}
+
+/// Light of a point light mirrored by the surface, per unit of irradiance on a plane that faces the light: the GGX BRDF
+/// without its Fresnel factor, times the cosine at the light.
+pub fn specular_reflection_direct(view_dir: DVec3, light_dir: DVec3, normal: DVec3, roughness: f64) -> f64 {
+    let (cos_view, cos_light) = (normal.dot(view_dir), normal.dot(light_dir));
+    if cos_view <= 0.0 || cos_light <= 0.0 || roughness == 0.0 {
+        return 0.0;
+    }
+    let alpha = roughness * roughness;
+    let half_dir = (view_dir + light_dir).normalize();
+    let masking = masking_ggx(cos_view, alpha) * masking_ggx(cos_light, alpha);
+    distribution_ggx(normal.dot(half_dir), alpha) * masking / (4.0 * cos_view * cos_light) * cos_light
 }
 
 #[cfg(test)]

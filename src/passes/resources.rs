@@ -37,7 +37,7 @@ impl Resources {
         let frame = frame(scene, plan, &view, lights.len() as u32);
         let (environment, specialization) = match &scene.environment.light {
             Surroundings::Image(panorama) => (upload_panorama(commands, panorama)?, true),
-            Surroundings::Color(_) => (upload_panorama(commands, &Panorama::uniform(Vec3::ONE))?, false),
+            Surroundings::Color(_) => (upload_panorama(commands, &Panorama::new(1, 1, vec![[1.0; 3]]))?, false),
         };
         let buffers = vec![
             commands.upload_buffer("frame", &[frame])?,

@@ -1,6 +1,6 @@
 //! The stats of a render, as JSON. What does not apply is null.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use crate::scene::Scene;
 
 /// Schema 1 of `--stats`.
 #[derive(Clone, Debug, Serialize)]
-#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+#[allow(missing_docs, reason = "docs/stats.md describes the members")]
 pub struct Stats {
     pub schema: u32,
     pub vitrum: &'static str,
@@ -39,7 +39,7 @@ pub struct Stats {
 
 /// Which device it was.
 #[derive(Clone, Debug, Serialize)]
-#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+#[allow(missing_docs, reason = "docs/stats.md describes the members")]
 pub struct DeviceStats {
     pub name: String,
     pub driver: String,
@@ -50,7 +50,7 @@ pub struct DeviceStats {
 
 /// A pass, over all samples.
 #[derive(Clone, Debug, Serialize)]
-#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+#[allow(missing_docs, reason = "docs/stats.md describes the members")]
 pub struct PassStats {
     pub name: &'static str,
     pub gpu_ms: Option<f64>,
@@ -58,7 +58,7 @@ pub struct PassStats {
 
 /// Host times before the first sample, in milliseconds.
 #[derive(Clone, Copy, Debug, Serialize)]
-#[expect(missing_docs, reason = "docs/stats.md describes the members")]
+#[allow(missing_docs, reason = "docs/stats.md describes the members")]
 pub struct BuildTimes {
     pub scene: f64,
     pub acceleration: Option<f64>,
@@ -66,9 +66,9 @@ pub struct BuildTimes {
 }
 
 impl Stats {
-    /// Those of one render that began at `start`; `load` is the time that it took to read the scene.
-    pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, start: Instant, load: Duration) -> Self {
-        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+    /// Those of one render; `load` is the time that it took to read the scene. What is only known at the very end is still
+    /// missing: see [`finish`](Self::finish).
+    pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, load: Duration) -> Self {
         let passes: Vec<_> = rendered.passes.iter().map(|&PassTime { name, gpu_ms }| PassStats { name, gpu_ms }).collect();
         let finite = |pixel: &&[f32; 3]| pixel.iter().all(|value| value.is_finite());
         Self {
@@ -96,7 +96,7 @@ impl Stats {
                 acceleration: None,
                 pipelines: ms(rendered.pipelines),
             },
-            wall_ms: ms(start.elapsed()),
+            wall_ms: 0.0,
             rays: None,
             peak_gpu_bytes: 0,
             discarded: None,
@@ -105,4 +105,18 @@ impl Stats {
             validation_messages: None,
         }
     }
+    /// The time of the whole run.
+    pub fn finish(&mut self, wall: Duration) {
+        self.wall_ms = ms(wall);
+    }
+
+    /// One object, readable and ended by a newline.
+    pub fn json(&self) -> String {
+        // Plain numbers, strings and lists: nothing that could fail.
+        serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+}
+
+fn ms(time: Duration) -> f64 {
+    time.as_secs_f64() * 1e3
 }

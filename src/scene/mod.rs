@@ -4,25 +4,36 @@
 //! lights, materials, meshes and the objects that place them. Lengths are metres, angles radians (degrees in files),
 //! y is up, the system right-handed, colours and radiance are linear Rec. 709.
 
+mod assembly;
+mod bounds;
 mod builtin;
 mod camera;
 mod environment;
 mod file;
+mod files;
 mod material;
 mod mesh;
+mod mtl;
 mod obj;
+mod obj_text;
+mod table;
+mod topology;
 
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
 
+pub use bounds::Bounds;
 pub use camera::Camera;
-pub use environment::{Environment, Panorama, Surroundings};
-pub use material::{Dielectric, Material, Opaque, Surface};
-pub use mesh::{Mesh, MeshFaults};
+pub use environment::{Environment, Panorama, Repairs, Surroundings};
+pub use material::{Dielectric, GLASSES, Glass, Material, Opaque, Surface};
+pub use mesh::{Mesh, MeshFaults, Refusal};
 
-use crate::Result;
 use crate::options::RenderArgs;
+use crate::{Error, Result};
+use assembly::{Assembly, Placement, Wear};
+use file::{EnvironmentTable, Light, SceneFile};
+use files::Files;
 
 /// Everything that a picture shows.
 #[derive(Clone, Debug)]
@@ -84,7 +95,85 @@ pub struct Overrides {
 
 impl Scene {
     /// The built-in scene, a `.toml` scene, or a bare mesh framed automatically.
+    ///
+    /// `overrides` win over the scene's `[render]` table, which wins over what its materials and environment say.
     pub fn load(path: Option<&Path>, overrides: &Overrides) -> Result<Self> {
-        todo!()
+        overrides.check()?;
+        let Some(path) = path else {
+            return Self::from_file(
+                file::read(Files::BuiltIn, Path::new(builtin::SCENE))?,
+                "built-in".into(),
+                overrides,
+            );
+        };
+        let name = path.display().to_string();
+        let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
+        match extension.as_deref() {
+            Some("toml") => Self::from_file(file::read(Files::Disk, path)?, name, overrides),
+            Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path)?, name, overrides),
+            _ => Err(Error::input(path, 0, "is no scene of a known kind; known: .toml (scene), .obj (mesh)")),
+        }
+    }
+
+    fn from_file(file: SceneFile, name: String, overrides: &Overrides) -> Result<Self> {
+        let SceneFile { environment, camera, lights, render, assembly } = file;
+        let overrides = Overrides {
+            ior: overrides.ior.or(render.ior),
+            roughness: overrides.roughness.or(render.roughness),
+            environment: overrides.environment.clone().or_else(|| render.env.clone()),
+        };
+        let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds()));
+        let Assembly { meshes, objects, mut materials, mut warnings, .. } = assembly;
+        for material in &mut materials {
+            if let Surface::Dielectric(dielectric) = &mut material.surface {
+                dielectric.ior = overrides.ior.unwrap_or(dielectric.ior);
+                dielectric.roughness = overrides.roughness.unwrap_or(dielectric.roughness);
+            }
+        }
+        let EnvironmentTable { light, intensity, rotation, visible } = environment;
+        let light = match overrides.environment.map_or(light, |path| Light::Image(Files::Disk, path)) {
+            Light::Image(files, path) => Surroundings::Image(Panorama::read(files, &path, &mut warnings)?),
+            Light::Color(color) => Surroundings::Color(color),
+        };
+        let environment = Environment { light, intensity, rotation, visible };
+        Ok(Self { name, environment, camera, lights, materials, meshes, objects, render, warnings })
+    }
+
+    /// The box around `object` in the world.
+    pub fn bounds_of(&self, object: &Object) -> Bounds {
+        Bounds::around_positions(&self.meshes[object.mesh].positions, &object.transform)
+    }
+
+    /// The box around all objects, if there are any.
+    pub fn bounds(&self) -> Option<Bounds> {
+        let bounds = self.objects.iter().fold(Bounds::EMPTY, |all, object| all.union(self.bounds_of(object)));
+        (!bounds.is_empty()).then_some(bounds)
+    }
+}
+
+/// A mesh of clear glass in the default environment.
+fn bare_mesh(path: &Path) -> Result<SceneFile> {
+    assembly::check_mesh_kind(path).map_err(|message| Error::input(path, 0, message))?;
+    let mut assembly = Assembly::default();
+    let place = Placement { number: 0, transform: DAffine3::IDENTITY, smooth: true };
+    assembly.add(Files::Disk, path, Wear::ClearGlass, &place)?;
+    Ok(SceneFile {
+        environment: EnvironmentTable::default(),
+        camera: None,
+        lights: Vec::new(),
+        render: RenderArgs::default(),
+        assembly,
+    })
+}
+
+impl Overrides {
+    fn check(&self) -> Result<()> {
+        if let Some(ior) = self.ior.filter(|ior| !(*ior > 0.0 && (*ior as f32).is_normal())) {
+            return Err(Error::Usage(format!("index of refraction {ior}: expected a number above 0")));
+        }
+        if let Some(roughness) = self.roughness.filter(|roughness| !(0.0..=1.0).contains(roughness)) {
+            return Err(Error::Usage(format!("roughness {roughness}: expected a number from 0 to 1")));
+        }
+        Ok(())
     }
 }

@@ -1,0 +1,55 @@
+#version 460
+// Copies every member of every shared struct to a buffer, in the order of their declaration, so that a test can compare
+// them with what the host wrote.
+#extension GL_GOOGLE_include_directive : require
+#include "shared.glsl"
+
+layout(local_size_x = 1) in;
+layout(std430, set = 0, binding = 8) writeonly buffer OutputBuffer { float members[]; };
+
+uint next = 0;
+
+void Put(float value) { members[next++] = value; }
+void Put(uint value) { Put(float(value)); }
+void Put(vec2 value) { Put(value.x); Put(value.y); }
+void Put(vec3 value) { Put(value.xy); Put(value.z); }
+void Put(vec4 value) { Put(value.xyz); Put(value.w); }
+void Put(mat4x3 value) { for (int column = 0; column < 4; ++column) Put(value[column]); }
+void Put(mat4 value) { for (int column = 0; column < 4; ++column) Put(value[column]); }
+
+void main()
+{
+    Put(frame.viewProjection);
+    Put(frame.rayCorner);
+    Put(frame.lightCount);
+    Put(frame.rayRight);
+    Put(frame.environmentTurn);
+    Put(frame.rayDown);
+    Put(frame.environmentVisible);
+    Put(frame.environmentRadiance);
+    Put(frame.reflectionRed);
+    Put(frame.reflectionIntensity);
+    Put(frame.transmissionGreen);
+    Put(frame.transmissionIntensity);
+    Put(frame.flippedRatio);
+    // The second of two, so that the size of the first counts too.
+    Put(instances[1].objectToWorld);
+    Put(instances[1].normalToWorld);
+    Put(instances[1].rayOrigin);
+    Put(instances[1].firstTriangle);
+    Put(instances[1].worldToObject);
+    Put(instances[1].firstVertex);
+    Put(instances[1].material);
+    Put(instances[1].smoothNormals);
+    Put(instances[1].number);
+    Put(materials[1].refractionIndex);
+    Put(materials[1].roughness);
+    Put(lights[1].position);
+    Put(lights[1].intensity);
+    Put(positions[1]);
+    Put(normals[1]);
+    Put(triangles[1]);
+    Put(jitter);
+    Put(clipOffset);
+    Put(instanceIndex);
+}

@@ -1,0 +1,115 @@
+//! Puts meshes in their places. In flow mesh files and where they stand, out flow meshes, objects and the materials
+//! that the files bring along; a file is read once, however many objects show it.
+
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
+
+use glam::DAffine3;
+
+use super::files::Files;
+use super::obj::{self, ObjFile};
+use super::{Bounds, Material, Mesh, Object};
+use crate::Result;
+
+/// Meshes, objects and materials so far.
+#[derive(Debug, Default)]
+pub struct Assembly {
+    pub meshes: Vec<Mesh>,
+    pub objects: Vec<Object>,
+    pub materials: Vec<Material>,
+    pub warnings: Vec<String>,
+    read: HashMap<PathBuf, MeshFile>,
+    clear_glass: Option<usize>,
+}
+
+/// A file that was read.
+#[derive(Debug)]
+struct MeshFile {
+    /// Index of the mesh and, within the file, of its material.
+    parts: Vec<(usize, Option<usize>)>,
+    materials: Vec<Material>,
+    warnings: Vec<String>,
+    /// Where the materials went, once something wears them.
+    first_material: Option<usize>,
+}
+
+/// Where an object stands.
+#[derive(Clone, Copy, Debug)]
+pub struct Placement {
+    pub number: usize,
+    pub transform: DAffine3,
+    pub smooth: bool,
+}
+
+/// What parts of a mesh file wear.
+#[derive(Clone, Copy, Debug)]
+pub enum Wear {
+    /// The material with this index.
+    Material(usize),
+    /// What the file says, or clear glass.
+    Own,
+    /// Clear glass, whatever the file says.
+    ClearGlass,
+}
+
+impl Assembly {
+    /// Adds the parts of the mesh file at `path` as one object.
+    pub fn add(&mut self, files: Files, path: &Path, wear: Wear, place: &Placement) -> Result<()> {
+        let identity = files.identity(path);
+        if !self.read.contains_key(&identity) {
+            let ObjFile { parts, materials, mut warnings, material_warnings } = obj::read(files, path)?;
+            self.warnings.append(&mut warnings);
+            let mut indices = Vec::with_capacity(parts.len());
+            for part in parts {
+                indices.push((self.meshes.len(), part.material));
+                self.meshes.push(part.mesh);
+            }
+            let file = MeshFile { parts: indices, materials, warnings: material_warnings, first_material: None };
+            self.read.insert(identity.clone(), file);
+        }
+        let Some(file) = self.read.get_mut(&identity) else { return Ok(()) };
+        let own = matches!(wear, Wear::Own);
+        if own && file.first_material.is_none() {
+            file.first_material = Some(self.materials.len());
+            self.materials.append(&mut file.materials);
+            self.warnings.append(&mut file.warnings);
+        }
+        if matches!(wear, Wear::ClearGlass) && !file.materials.is_empty() {
+            let count = file.materials.len();
+            self.warnings.push(format!("{}: shown as clear glass, not with its {count} materials", path.display()));
+        }
+        let first_material = file.first_material.unwrap_or(0);
+        for &(mesh, own) in &file.parts {
+            let material = match (wear, own) {
+                (Wear::Material(material), _) => material,
+                (Wear::Own, Some(own)) => first_material + own,
+                (Wear::Own, None) | (Wear::ClearGlass, _) => *self.clear_glass.get_or_insert_with(|| {
+                    self.materials.push(Material::clear_glass());
+                    self.materials.len() - 1
+                }),
+            };
+            let Placement { number, transform, smooth } = *place;
+            self.objects.push(Object { mesh, material, number, transform, smooth });
+        }
+        Ok(())
+    }
+
+    /// The box around an object in the world.
+    pub fn bounds_of(&self, object: &Object) -> Bounds {
+        Bounds::around_positions(&self.meshes[object.mesh].positions, &object.transform)
+    }
+
+    /// The box around all objects.
+    pub fn bounds(&self) -> Bounds {
+        self.objects.iter().fold(Bounds::EMPTY, |all, object| all.union(self.bounds_of(object)))
+    }
+}
+
+/// Whether the extension at `path` is one of a mesh that is read; the error says what to do.
+pub fn check_mesh_kind(path: &Path) -> Result<(), String> {
+    match path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase()).as_deref() {
+        Some("obj") => Ok(()),
+        Some("glb" | "gltf") => Err(format!("{:?}: glTF is not read yet; convert to .obj", path.display().to_string())),
+        _ => Err(format!("{:?} is no mesh of a known kind; known: .obj", path.display().to_string())),
+    }
+}

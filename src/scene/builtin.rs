@@ -1,0 +1,25 @@
+//! The scene and the environment that need no file: those of `assets/`, compiled in. In flow paths that start at
+//! `built-in` and mirror `assets/`, out flow bytes.
+
+use std::path::Path;
+
+/// The scene that is shown when none is named.
+pub const SCENE: &str = "built-in/scenes/teapot.toml";
+
+/// What surrounds a scene that says nothing about it.
+pub const ENVIRONMENT: &str = "built-in/environments/city.exr";
+
+/// The files, by their path.
+const FILES: [(&str, &[u8]); 6] = [
+    (SCENE, include_bytes!("../../assets/scenes/teapot.toml")),
+    (ENVIRONMENT, include_bytes!("../../assets/environments/city.exr")),
+    ("built-in/meshes/teapot_body.obj", include_bytes!("../../assets/meshes/teapot_body.obj")),
+    ("built-in/meshes/teapot_lid.obj", include_bytes!("../../assets/meshes/teapot_lid.obj")),
+    ("built-in/meshes/cup_tumbler.obj", include_bytes!("../../assets/meshes/cup_tumbler.obj")),
+    ("built-in/meshes/cup_tea.obj", include_bytes!("../../assets/meshes/cup_tea.obj")),
+];
+
+/// The bytes of the file at `path`, which holds neither `.` nor `..`.
+pub fn file(path: &Path) -> Option<&'static [u8]> {
+    FILES.iter().find(|(known, _)| Path::new(known) == path).map(|&(_, bytes)| bytes)
+}

@@ -1,0 +1,286 @@
+//! The TOML scene file. In flow its text and the files it names, out flows a [`Scene`]; what is wrong in it is an error
+//! with file, line and what would be right.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DAffine3, DMat3, DVec3};
+use serde::Deserialize;
+use toml::de::{DeTable, ValueDeserializer};
+
+use super::assembly::{Assembly, Placement, Wear, check_mesh_kind};
+use super::camera::DEFAULT_FOV;
+use super::files::Files;
+use super::material::Glass;
+use super::mesh::FARTHEST;
+use super::table::{Document, Entry, FIELD, FINITE, LENGTH, LIGHT, POSITIVE, POSITIVE_OR_INFINITE, SCALE, Table, UNIT};
+use super::{Camera, Dielectric, Material, Opaque, PointLight, Surface, builtin};
+use crate::options::RenderArgs;
+use crate::{Error, Result};
+
+/// Where an environment comes from, before images are read.
+#[derive(Clone, Debug)]
+pub enum Light {
+    /// An image file.
+    Image(Files, PathBuf),
+    /// The same from everywhere.
+    Color(DVec3),
+}
+
+/// An environment whose image is not read yet: the command line may replace it.
+#[derive(Clone, Debug)]
+pub struct EnvironmentTable {
+    /// Image or colour.
+    pub light: Light,
+    /// Factor.
+    pub intensity: f64,
+    /// Radians.
+    pub rotation: f64,
+    /// Seen by the camera.
+    pub visible: bool,
+}
+
+impl Default for EnvironmentTable {
+    fn default() -> Self {
+        let light = Light::Image(Files::BuiltIn, builtin::ENVIRONMENT.into());
+        Self { light, intensity: 1.0, rotation: 0.0, visible: true }
+    }
+}
+
+/// What a scene file says, with its meshes but without the image of its environment.
+pub struct SceneFile {
+    pub environment: EnvironmentTable,
+    pub camera: Option<Camera>,
+    pub lights: Vec<PointLight>,
+    pub render: RenderArgs,
+    pub assembly: Assembly,
+}
+
+/// Reads the scene file at `path`.
+pub fn read(files: Files, path: &Path) -> Result<SceneFile> {
+    let bytes = files.read(path)?;
+    let text = std::str::from_utf8(&bytes).map_err(|error| {
+        let line = bytes[..error.valid_up_to()].iter().filter(|&&byte| byte == b'\n').count() + 1;
+        Error::input(path, line, "is not UTF-8 text; save it as UTF-8")
+    })?;
+    let document = Document { path, text };
+    let parsed = DeTable::parse(text)
+        .map_err(|error| document.error(error.span().unwrap_or(0..0), error.message().replace('\n', ", ")))?;
+    let root = Table::root(document, &parsed, &["environment", "camera", "render", "light", "material", "object"])?;
+    let reader = Reader { files, folder: path.parent().unwrap_or(Path::new("")) };
+
+    let environment = root.or("environment", EnvironmentTable::default(), |entry| reader.environment(entry))?;
+    let camera = root.get("camera").map(camera).transpose()?;
+    let render = root.or("render", RenderArgs::default(), |entry| reader.render(entry))?;
+    let lights = root.or("light", Vec::new(), |entry| entry.tables()?.into_iter().map(light).collect())?;
+    let mut assembly = Assembly::default();
+    if let Some(materials) = root.get("material") {
+        for entry in materials.any_table("material.NAME")?.entries() {
+            assembly.materials.push(Material { name: entry.key.to_owned(), surface: reader.surface(entry)? });
+        }
+    }
+    let named = assembly.materials.len();
+    if let Some(objects) = root.get("object") {
+        for (number, entry) in objects.tables()?.into_iter().enumerate() {
+            reader.object(entry, number, named, &mut assembly)?;
+        }
+    }
+    Ok(SceneFile { environment, camera, lights, render, assembly })
+}
+
+fn camera(entry: Entry<'_>) -> Result<Camera> {
+    let table = entry.table("camera", &["position", "target", "up", "vertical_fov"])?;
+    let position = table.require("position")?.triple(&LENGTH)?;
+    let target = table.require("target")?.triple(&LENGTH)?;
+    let up = table.or("up", DVec3::Y, |up| up.triple(&FINITE))?;
+    let vertical_fov = table.or("vertical_fov", DEFAULT_FOV, |fov| fov.number(&FIELD))?.to_radians();
+    Camera::new(position, target, up, vertical_fov).map_err(|message| table.error(format!("[camera]: {message}")))
+}
+
+fn light(entry: Entry<'_>) -> Result<PointLight> {
+    let table = entry.table("[light]", &["kind", "position", "intensity"])?;
+    table.require("kind")?.choice(&[("point", ())])?;
+    let position = table.require("position")?.triple(&LENGTH)?;
+    let intensity = table.require("intensity")?.triple(&LIGHT)?;
+    Ok(PointLight { position, intensity })
+}
+
+/// Reads what refers to other files.
+struct Reader<'a> {
+    files: Files,
+    folder: &'a Path,
+}
+
+#[derive(Clone, Copy)]
+enum Kind {
+    Dielectric,
+    Opaque,
+}
+
+impl Reader<'_> {
+    /// A file that exists.
+    fn path(&self, entry: Entry<'_>) -> Result<PathBuf> {
+        let path = self.folder.join(entry.text("a file name")?);
+        if self.files.exists(&path) {
+            return Ok(path);
+        }
+        let why = if path.is_dir() { "is a folder, not a file" } else { "does not exist" };
+        Err(entry.error(format!("{}: {:?} {why}", entry.key, path.display().to_string())))
+    }
+
+    fn environment(&self, entry: Entry<'_>) -> Result<EnvironmentTable> {
+        let table = entry.table("environment", &["image", "color", "intensity", "rotation", "visible"])?;
+        let light = match (table.get("image"), table.get("color")) {
+            (Some(image), None) => Light::Image(self.files, self.path(image)?),
+            (None, Some(color)) => Light::Color(color.triple(&LIGHT)?),
+            (Some(_), Some(color)) => {
+                return Err(color.error("[environment] has both image and color; keep one of them"));
+            }
+            (None, None) => return Err(table.error("[environment] has neither image nor color; give one of them")),
+        };
+        Ok(EnvironmentTable {
+            light,
+            intensity: table.or("intensity", 1.0, |entry| entry.number(&LIGHT))?,
+            rotation: table.or("rotation", 0.0, |entry| entry.number(&FINITE))?.to_radians(),
+            visible: table.or("visible", true, |entry| entry.boolean())?,
+        })
+    }
+
+    fn render(&self, entry: Entry<'_>) -> Result<RenderArgs> {
+        let table = entry.any_table("render")?;
+        let mut args = RenderArgs::deserialize(ValueDeserializer::from(entry.value().clone())).map_err(|error| {
+            let span = error.span().unwrap_or(entry.value().span());
+            let entries = table.entries();
+            let key = entries
+                .iter()
+                .find(|entry| entry.value().span().start <= span.start && span.end <= entry.value().span().end);
+            let message = error.message();
+            // Serde's words for what the other tables say in theirs.
+            let unknown = message.strip_prefix("unknown field ").and_then(|rest| rest.split_once(", expected one of "));
+            let message = match (unknown, key) {
+                (Some((name, allowed)), _) => {
+                    format!(
+                        "unknown key \"{}\" in [render]; allowed here: {}",
+                        name.replace('`', ""),
+                        allowed.replace('`', "")
+                    )
+                }
+                (None, Some(key)) => format!("{}: {message}", key.key),
+                (None, None) => format!("[render]: {message}"),
+            };
+            entry.document.error(span, message.replace('\n', ", "))
+        })?;
+        if let Some(image) = table.get("env") {
+            args.env = Some(self.path(image)?);
+        }
+        Ok(args)
+    }
+
+    fn surface(&self, entry: Entry<'_>) -> Result<Surface> {
+        let kind = entry.any_table("material.NAME")?.require("kind").map_err(|error| match error {
+            Error::Input { path, line, .. } => Error::Input {
+                path,
+                line,
+                message: format!("missing key \"kind\" in [material.{}]; \"dielectric\" or \"opaque\"", entry.key),
+            },
+            other => other,
+        })?;
+        let name = format!("material.{}", entry.key);
+        match kind.choice(&[("dielectric", Kind::Dielectric), ("opaque", Kind::Opaque)])? {
+            Kind::Dielectric => dielectric(&entry.table(
+                &name,
+                &[
+                    "kind",
+                    "ior",
+                    "roughness",
+                    "dispersion",
+                    "attenuation_color",
+                    "attenuation_distance",
+                    "thin_walled",
+                    "priority",
+                ],
+            )?),
+            Kind::Opaque => self.opaque(&entry.table(
+                &name,
+                &["kind", "base_color", "base_color_texture", "metallic", "roughness", "specular", "emission"],
+            )?),
+        }
+    }
+
+    fn opaque(&self, table: &Table<'_>) -> Result<Surface> {
+        let plain = Opaque::default();
+        let texture = table.get("base_color_texture");
+        if let (Some(texture), Some(_)) = (texture, table.get("base_color")) {
+            return Err(texture.error("base_color_texture stands beside base_color; keep one of them"));
+        }
+        Ok(Surface::Opaque(Opaque {
+            base_color: table.or("base_color", plain.base_color, |entry| entry.triple(&UNIT))?,
+            base_color_texture: texture.map(|entry| self.path(entry)).transpose()?,
+            metallic: table.or("metallic", plain.metallic, |entry| entry.number(&UNIT))?,
+            roughness: table.or("roughness", plain.roughness, |entry| entry.number(&UNIT))?,
+            specular: table.or("specular", plain.specular, |entry| entry.number(&UNIT))?,
+            emission: table.or("emission", plain.emission, |entry| entry.triple(&LIGHT))?,
+        }))
+    }
+
+    fn object(&self, entry: Entry<'_>, number: usize, named: usize, assembly: &mut Assembly) -> Result<()> {
+        let table = entry.table("[object]", &["mesh", "material", "translate", "rotate", "scale", "smooth"])?;
+        let mesh = table.require("mesh")?;
+        let path = self.path(mesh)?;
+        check_mesh_kind(&path).map_err(|message| mesh.error(format!("mesh: {message}")))?;
+        let wear = table.or("material", Wear::Own, |entry| {
+            material_number(entry, &assembly.materials[..named]).map(Wear::Material)
+        })?;
+        let translate = table.or("translate", DVec3::ZERO, |entry| entry.triple(&LENGTH))?;
+        let degrees = table.or("rotate", DVec3::ZERO, |entry| entry.triple(&FINITE))?;
+        let scale = table.or("scale", DVec3::ONE, |entry| entry.number_or_triple(&SCALE))?;
+        let smooth = table.or("smooth", true, |entry| entry.boolean())?;
+        let placement = Placement { number, transform: placed(scale, degrees, translate), smooth };
+        let first = assembly.objects.len();
+        assembly.add(self.files, &path, wear, &placement)?;
+        for object in &assembly.objects[first..] {
+            let bounds = assembly.bounds_of(object);
+            // Not to be simplified: NaN must fail too.
+            if !(bounds.reach() <= FARTHEST) {
+                let reach = bounds.reach();
+                return Err(table
+                    .error(format!("the object reaches {reach:.3e} m; at most 1e9 m can be rendered, scale it down")));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn dielectric(table: &Table<'_>) -> Result<Surface> {
+    let clear = Dielectric::default();
+    let ior = |entry: Entry<'_>| match entry.as_text() {
+        Some(name) => Glass::named(name).map(|glass| glass.ior).map_err(|message| entry.error(message)),
+        None => entry.number(&POSITIVE),
+    };
+    Ok(Surface::Dielectric(Dielectric {
+        ior: table.or("ior", clear.ior, ior)?,
+        roughness: table.or("roughness", clear.roughness, |entry| entry.number(&UNIT))?,
+        dispersion: table.or("dispersion", clear.dispersion, |entry| entry.number(&LIGHT))?,
+        attenuation_color: table.or("attenuation_color", clear.attenuation_color, |entry| entry.triple(&UNIT))?,
+        attenuation_distance: table
+            .or("attenuation_distance", clear.attenuation_distance, |entry| entry.number(&POSITIVE_OR_INFINITE))?,
+        thin_walled: table.or("thin_walled", clear.thin_walled, |entry| entry.boolean())?,
+        priority: table.or("priority", clear.priority, |entry| entry.integer())?,
+    }))
+}
+
+fn material_number(entry: Entry<'_>, materials: &[Material]) -> Result<usize> {
+    let name = entry.text("the name of a material")?;
+    materials.iter().position(|material| material.name == name).ok_or_else(|| {
+        let names: Vec<_> = materials.iter().map(|material| material.name.as_str()).collect();
+        let defined = if names.is_empty() { "none; add [material.NAME]".into() } else { names.join(", ") };
+        entry.error(format!("unknown material {name:?}; defined: {defined}"))
+    })
+}
+
+/// Scales, then rotates about x, y and z, then translates.
+fn placed(scale: DVec3, degrees: DVec3, translate: DVec3) -> DAffine3 {
+    let radians = degrees.map(f64::to_radians);
+    let rotation =
+        DMat3::from_rotation_z(radians.z) * DMat3::from_rotation_y(radians.y) * DMat3::from_rotation_x(radians.x);
+    DAffine3 { matrix3: rotation * DMat3::from_diagonal(scale), translation: translate }
+}

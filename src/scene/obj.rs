@@ -1,0 +1,128 @@
+//! Wavefront OBJ. In flow the bytes of an `.obj` and of the `.mtl` it names, out flow parts: a mesh and what it wears.
+//!
+//! A part is what an `o` line opens, cut where the material changes; groups (`g`) cut nothing, because a piece of a
+//! closed surface bounds no medium. Polygons are cut as fans. Points, lines, free-form geometry and texture
+//! coordinates are left out. [`super::obj_text`] tidies the text, then `tobj` reads it.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use super::files::Files;
+use super::material::Material;
+use super::mesh::{Mesh, Refusal};
+use super::mtl;
+use super::obj_text::{Tidy, bad_number};
+use crate::{Error, Result};
+
+/// What an OBJ file holds.
+#[derive(Clone, Debug)]
+pub struct ObjFile {
+    /// Meshes with indices into [`ObjFile::materials`].
+    pub parts: Vec<Part>,
+    /// The materials of the MTL files.
+    pub materials: Vec<Material>,
+    /// What is wrong with the meshes, one line each.
+    pub warnings: Vec<String>,
+    /// What is wrong with the materials, which matters only to those who use them.
+    pub material_warnings: Vec<String>,
+}
+
+/// One mesh of a file.
+#[derive(Clone, Debug)]
+pub struct Part {
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Index into [`ObjFile::materials`].
+    pub material: Option<usize>,
+}
+
+/// Reads the `.obj` at `path` and the `.mtl` it names.
+pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
+    let bytes = files.read(path)?;
+    if bytes.contains(&0) {
+        return Err(Error::input(path, 0, "is binary, not Wavefront OBJ text; export as .obj"));
+    }
+    let text = String::from_utf8_lossy(&bytes);
+    let tidy = Tidy::new(&text).map_err(|(line, message)| Error::input(path, line, message))?;
+
+    let mut material_warnings = Vec::new();
+    let materials = mtl::read_all(files, path, &tidy.libraries, &mut material_warnings);
+    // As in an MTL file, the last one of a name counts.
+    let numbers: HashMap<&str, usize> = materials.iter().enumerate().map(|(i, m)| (m.name.as_str(), i)).collect();
+    for unknown in tidy.materials.iter().filter(|name| !numbers.contains_key(name.as_str())) {
+        material_warnings.push(format!("{}: material {unknown:?} is in no MTL file that was read", path.display()));
+    }
+
+    let names_only = |_: &Path| {
+        let numbers = numbers.iter().map(|(name, number)| (name.to_string(), *number)).collect();
+        Ok((vec![tobj::Material::default(); materials.len()], numbers))
+    };
+    let loaded = tobj::load_obj_buf(&mut tidy.text.as_bytes(), &tobj::GPU_LOAD_OPTIONS, names_only);
+    let (models, _) = loaded.map_err(|error| match bad_number(&text) {
+        Some((line, message)) => Error::input(path, line, message),
+        None => Error::input(path, 0, format!("cannot be read as OBJ: {error}")),
+    })?;
+    let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+    let mut warnings: Vec<_> = tidy.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
+    let parts = parts(path, &file, &text, models, &mut warnings)?;
+    Ok(ObjFile { parts, materials, warnings, material_warnings })
+}
+
+#[derive(Default)]
+struct RawPart {
+    name: String,
+    material: Option<usize>,
+    positions: Vec<[f32; 3]>,
+    normals: Vec<[f32; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+/// Joins the models that tobj cut a part into, and checks each part.
+fn parts(
+    path: &Path,
+    file: &str,
+    text: &str,
+    models: Vec<tobj::Model>,
+    warnings: &mut Vec<String>,
+) -> Result<Vec<Part>> {
+    let mut raw: Vec<RawPart> = Vec::new();
+    let mut numbers = HashMap::new();
+    for tobj::Model { mesh, name } in models {
+        let number = *numbers.entry((name.clone(), mesh.material_id)).or_insert_with(|| {
+            raw.push(RawPart { name, material: mesh.material_id, ..RawPart::default() });
+            raw.len() - 1
+        });
+        let part = &mut raw[number];
+        let offset = part.positions.len() as u32;
+        part.positions.extend(mesh.positions.as_chunks().0);
+        part.normals.extend(mesh.normals.as_chunks().0);
+        let triangles = mesh.indices.as_chunks().0.iter();
+        part.triangles.extend(triangles.map(|triangle| triangle.map(|vertex| vertex + offset)));
+    }
+    let several = raw.len() > 1;
+    let mut parts = Vec::new();
+    let mut lost = 0;
+    for RawPart { name, material, positions, normals, triangles } in raw {
+        let name = if several { format!("{file} ({name})") } else { file.to_owned() };
+        match Mesh::new(name, positions, normals, triangles) {
+            Ok(mesh) => {
+                if !mesh.faults.is_empty() {
+                    warnings.push(format!("{}: {}", mesh.name, mesh.faults));
+                }
+                parts.push(Part { mesh, material });
+            }
+            Err(Refusal::NoTriangles { degenerate }) => lost += degenerate,
+            Err(refusal) => {
+                let (line, message) = bad_number(text).unwrap_or_else(|| (0, refusal.to_string()));
+                return Err(Error::input(path, line, message));
+            }
+        }
+    }
+    if parts.is_empty() {
+        return Err(Error::input(path, 0, Refusal::NoTriangles { degenerate: lost }.to_string()));
+    }
+    if lost > 0 {
+        warnings.push(format!("{file}: {lost} degenerate triangles removed, and the parts that held nothing else"));
+    }
+    Ok(parts)
+}

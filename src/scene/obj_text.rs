@@ -1,0 +1,293 @@
+//! Tidies the text of an OBJ file for `tobj`. In flow the text as found, out flows one that `tobj` reads right, or the
+//! line that is wrong.
+//!
+//! `tobj` takes polylines for polygons, mixes up normals where some corners have none, divides by w, overflows on
+//! hostile indices, and has no line numbers. So indices are resolved and checked here, all vertices come first, and
+//! corners without a normal get one of zero, which [`super::mesh`] replaces.
+
+use std::borrow::Cow;
+use std::fmt::Write;
+
+use super::mesh::FARTHEST;
+
+/// What an OBJ file says, in a form without traps.
+#[derive(Debug, Default)]
+pub struct Tidy {
+    /// OBJ text of `mtllib`, `v`, `vn`, `o`, `usemtl` and `f` lines, each with absolute indices.
+    pub text: String,
+    /// File names after `mtllib`, each line once.
+    pub libraries: Vec<String>,
+    /// Names after `usemtl`, each once.
+    pub materials: Vec<String>,
+    /// What was left out, one line each.
+    pub remarks: Vec<String>,
+}
+
+/// A line, from 1, and what is wrong with it.
+pub type Fault = (usize, String);
+
+/// How many vertices, texture coordinates and normals there are.
+type Counts = [usize; 3];
+
+/// Keywords that say nothing about triangles.
+const SILENT: [&str; 13] =
+    ["vt", "vp", "g", "s", "mg", "lod", "bevel", "c_interp", "d_interp", "usemap", "maplib", "shadow_obj", "trace_obj"];
+
+/// Keywords of geometry that is no polygon.
+const FREE_FORM: [&str; 14] =
+    ["cstype", "deg", "bmat", "step", "curv", "curv2", "surf", "parm", "trim", "hole", "scrv", "sp", "end", "con"];
+
+impl Tidy {
+    /// Tidies `text`.
+    pub fn new(text: &str) -> Result<Self, Fault> {
+        let mut tidy = Self { text: String::with_capacity(text.len() + 64), ..Self::default() };
+        tidy.text.push_str("mtllib -\n");
+        let totals = tidy.vertices(text)?;
+        tidy.faces(text, totals)?;
+        Ok(tidy)
+    }
+
+    /// Writes the lines of vertices and normals, and one zero normal.
+    fn vertices(&mut self, text: &str) -> Result<Counts, Fault> {
+        let [mut vertices, mut coordinates, mut normals] = [0; 3];
+        let mut zero_normal = String::new();
+        for (number, line) in lines(text) {
+            let (keyword, rest) = split_keyword(&line);
+            let (count, out) = match keyword {
+                "v" => (&mut vertices, &mut self.text),
+                "vn" => (&mut normals, &mut zero_normal),
+                "vt" => {
+                    coordinates += 1;
+                    continue;
+                }
+                _ => continue,
+            };
+            *count += 1;
+            let mut numbers = rest.split_ascii_whitespace();
+            let (Some(x), Some(y), Some(z)) = (numbers.next(), numbers.next(), numbers.next()) else {
+                return Err((number, format!("{:?} lacks a number; expected {keyword} X Y Z", excerpt(&line))));
+            };
+            for part in [keyword, " ", x, " ", y, " ", z, "\n"] {
+                out.push_str(part);
+            }
+        }
+        self.text.push_str(&zero_normal);
+        self.text.push_str("vn 0 0 0\n");
+        Ok([vertices, coordinates, normals])
+    }
+
+    /// Writes the faces and what names them.
+    fn faces(&mut self, text: &str, totals: Counts) -> Result<(), Fault> {
+        let mut counts = [0; 3];
+        let mut used = vec![false; totals[0]];
+        let (mut slivers, mut wires, mut free_form, mut unknown) = (0, 0, 0, Vec::new());
+        let mut out_of_range: Vec<Fault> = Vec::new();
+        for (number, line) in lines(text) {
+            let (keyword, rest) = split_keyword(&line);
+            match keyword {
+                "f" | "fo" => {
+                    let corners: Result<Vec<_>, _> =
+                        rest.split_ascii_whitespace().map(|corner| Corner::read(corner, counts, totals)).collect();
+                    match corners {
+                        Err(why) if why.malformed => {
+                            return Err((number, format!("{:?}: {}", excerpt(&line), why.message)));
+                        }
+                        Err(why) => out_of_range.push((number, why.message)),
+                        Ok(corners) if corners.len() < 3 => slivers += 1,
+                        Ok(corners) => {
+                            corners.iter().for_each(|corner| used[corner.vertex] = true);
+                            self.face(&corners, totals[2]);
+                        }
+                    }
+                }
+                "v" => counts[0] += 1,
+                "vt" => counts[1] += 1,
+                "vn" => counts[2] += 1,
+                "o" => self.name("o", rest),
+                "usemtl" => {
+                    self.name("usemtl", rest);
+                    remember(&mut self.materials, rest);
+                }
+                "mtllib" => remember(&mut self.libraries, rest),
+                "l" | "p" => wires += 1,
+                "" => {}
+                comment if comment.starts_with('#') => {}
+                other if SILENT.contains(&other) => {}
+                other if FREE_FORM.contains(&other) => free_form += 1,
+                _ => unknown.push(number),
+            }
+        }
+        if let Some((line, message)) = out_of_range.first() {
+            let others = out_of_range.len() - 1;
+            return Err((
+                *line,
+                if others == 0 { message.clone() } else { format!("{message}; so do {others} more faces") },
+            ));
+        }
+        let unused = used.iter().filter(|used| !**used).count();
+        for (count, what) in [
+            (slivers, "faces with less than three corners left out"),
+            (wires, "lines and points left out; only faces are shown"),
+            (free_form, "lines of free-form geometry left out; export triangles"),
+            (unused, "unused vertices left out"),
+            (unknown.len(), "lines not understood and left out"),
+        ] {
+            if count > 0 {
+                self.remarks.push(format!("{count} {what}"));
+            }
+        }
+        if let (Some(first), Some(remark)) = (unknown.first(), self.remarks.last_mut()) {
+            remark.push_str(&format!(", the first is line {first}"));
+        }
+        Ok(())
+    }
+
+    fn name(&mut self, keyword: &str, name: &str) {
+        if !name.is_empty() {
+            for part in [keyword, " ", name, "\n"] {
+                self.text.push_str(part);
+            }
+        }
+    }
+
+    /// A face whose corners without a normal get the zero normal at the end of all `normals`.
+    fn face(&mut self, corners: &[Corner<'_>], normals: usize) {
+        self.text.push('f');
+        for corner in corners {
+            self.text.push(' ');
+            push_index(&mut self.text, corner.vertex_text, corner.vertex);
+            if normals > 0 {
+                self.text.push_str("//");
+                push_index(&mut self.text, corner.normal_text, corner.normal.unwrap_or(normals));
+            }
+        }
+        self.text.push('\n');
+    }
+}
+
+/// Appends the index, from 0, as OBJ counts it; `text` is what stood there.
+fn push_index(out: &mut String, text: &str, index: usize) {
+    // Copying digits is several times faster than printing them.
+    if text.starts_with(|digit: char| digit.is_ascii_digit()) {
+        out.push_str(text);
+    } else {
+        let _ = write!(out, "{}", index + 1);
+    }
+}
+
+fn remember(names: &mut Vec<String>, name: &str) {
+    if !name.is_empty() && !names.iter().any(|known| known == name) {
+        names.push(name.to_owned());
+    }
+}
+
+/// One corner of a face: indices from 0, and as they stood.
+struct Corner<'a> {
+    vertex: usize,
+    vertex_text: &'a str,
+    normal: Option<usize>,
+    normal_text: &'a str,
+}
+
+struct BadCorner {
+    malformed: bool,
+    message: String,
+}
+
+impl<'a> Corner<'a> {
+    /// Reads `v`, `v/vt`, `v//vn` or `v/vt/vn`. Negative indices count back from `so_far`.
+    fn read(text: &'a str, so_far: Counts, totals: Counts) -> Result<Self, BadCorner> {
+        let mut fields = text.split('/');
+        let [vertex_text, coordinate_text, normal_text] = [(); 3].map(|()| fields.next().unwrap_or(""));
+        if fields.next().is_some() || vertex_text.is_empty() {
+            let message = format!("{text:?} is no corner; expected V, V/VT, V//VN or V/VT/VN");
+            return Err(BadCorner { malformed: true, message });
+        }
+        let index = |text: &str, kind: usize| {
+            resolve(text, ["vertex", "texture coordinate", "normal"][kind], so_far[kind], totals[kind])
+        };
+        let vertex = index(vertex_text, 0)?;
+        if !coordinate_text.is_empty() {
+            index(coordinate_text, 1)?;
+        }
+        let normal = if normal_text.is_empty() { None } else { Some(index(normal_text, 2)?) };
+        Ok(Self { vertex, vertex_text, normal, normal_text })
+    }
+}
+
+fn resolve(text: &str, what: &str, so_far: usize, total: usize) -> Result<usize, BadCorner> {
+    let number: i64 = text.parse().map_err(|_| BadCorner {
+        malformed: true,
+        message: format!("{text:?} is no index; expected a whole number from 1, or below 0 to count back"),
+    })?;
+    let index = if number < 0 { so_far as i64 + number } else { number - 1 };
+    if (0..total as i64).contains(&index) {
+        return Ok(index as usize);
+    }
+    let message = format!("a face names {what} {number}, which does not exist (the file has {total})");
+    Err(BadCorner { malformed: false, message })
+}
+
+/// The first line of a vertex or normal that holds no number or, for a vertex, one that cannot be used.
+pub fn bad_number(text: &str) -> Option<Fault> {
+    let mut first: Option<Fault> = None;
+    let mut count = 0;
+    for (number, line) in lines(text) {
+        let (keyword, rest) = split_keyword(&line);
+        if keyword != "v" && keyword != "vn" {
+            continue;
+        }
+        for word in rest.split_ascii_whitespace().take(3) {
+            match word.parse::<f32>() {
+                Err(_) => return Some((number, format!("{:?} is no number; expected {keyword} X Y Z", excerpt(word)))),
+                Ok(value) if keyword == "v" && !(f64::from(value.abs()) <= FARTHEST) => {
+                    count += 1;
+                    first.get_or_insert_with(|| {
+                        let wanted = format!("coordinates must be finite and not beyond {FARTHEST:e}");
+                        (number, format!("vertex coordinate {}: {wanted}", excerpt(word)))
+                    });
+                    break;
+                }
+                Ok(_) => {}
+            }
+        }
+    }
+    let (line, message) = first?;
+    Some((line, if count == 1 { message } else { format!("{message}; so in {count} vertices") }))
+}
+
+/// Lines with their number from 1; a backslash at the end joins the next one.
+fn lines(text: &str) -> impl Iterator<Item = (usize, Cow<'_, str>)> {
+    let mut lines = text.lines().enumerate();
+    std::iter::from_fn(move || {
+        let (index, line) = lines.next()?;
+        let Some(start) = line.strip_suffix('\\') else { return Some((index + 1, Cow::Borrowed(line))) };
+        let mut joined = start.to_owned();
+        for (_, next) in lines.by_ref() {
+            joined.push(' ');
+            match next.strip_suffix('\\') {
+                Some(middle) => joined.push_str(middle),
+                None => {
+                    joined.push_str(next);
+                    break;
+                }
+            }
+        }
+        Some((index + 1, Cow::Owned(joined)))
+    })
+}
+
+/// The first word and the rest, both without space around.
+fn split_keyword(line: &str) -> (&str, &str) {
+    let line = line.trim();
+    line.split_once(|c: char| c.is_ascii_whitespace()).map_or((line, ""), |(keyword, rest)| (keyword, rest.trim()))
+}
+
+/// Enough of a line to recognise it in a message.
+fn excerpt(line: &str) -> String {
+    const LONGEST: usize = 60;
+    match line.trim().char_indices().nth(LONGEST) {
+        Some((end, _)) => format!("{}...", &line.trim()[..end]),
+        None => line.trim().to_owned(),
+    }
+}

@@ -1,0 +1,163 @@
+//! What is wrong with a surface as the boundary of a medium. In flow positions and triangles, out flow counts.
+//!
+//! Vertices are welded by exact position first: files split vertices where normals or texture coordinates differ.
+
+use glam::DVec3;
+
+use super::Bounds;
+use super::mesh::MeshFaults;
+
+/// How many triangles may be visited to find out which shell holds which; beyond that bounding boxes decide.
+const WINDING_BUDGET: usize = 50_000_000;
+
+/// A welded, connected piece of a surface.
+struct Shell {
+    triangles: Vec<[u32; 3]>,
+    bounds: Bounds,
+    closed: bool,
+    volume: f64,
+}
+
+/// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`.
+pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut MeshFaults) {
+    let welded = weld(positions);
+    // A triangle that welding folds up has edges that cancel out.
+    let triangles: Vec<[u32; 3]> = triangles
+        .iter()
+        .map(|triangle| triangle.map(|vertex| welded[vertex as usize]))
+        .filter(|[a, b, c]| a != b && b != c && c != a)
+        .collect();
+    let faulty = faulty_edges(&triangles, faults);
+    faults.inverted_shells = inverted_shells(&shells(positions, triangles, &faulty), positions);
+}
+
+/// For each vertex the first one, in the order of their bits, at the same place.
+fn weld(positions: &[[f32; 3]]) -> Vec<u32> {
+    // Adding zero turns -0 into +0, which is the same place.
+    let bits = |vertex: u32| positions[vertex as usize].map(|coordinate| (coordinate + 0.0).to_bits());
+    let mut order: Vec<([u32; 3], u32)> = (0..positions.len() as u32).map(|vertex| (bits(vertex), vertex)).collect();
+    order.sort_unstable();
+    let mut welded = vec![0; positions.len()];
+    let mut first = ([0; 3], u32::MAX);
+    for (place, vertex) in order {
+        if first.1 == u32::MAX || place != first.0 {
+            first = (place, vertex);
+        }
+        welded[vertex as usize] = first.1;
+    }
+    welded
+}
+
+/// Counts the edges that do not join two triangles of one orientation and returns a vertex of each unbalanced one.
+fn faulty_edges(triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Vec<u32> {
+    // One word an edge: the lower vertex, the higher one (no file that is read has 2^31), the direction.
+    let mut edges = Vec::with_capacity(triangles.len() * 3);
+    for &[a, b, c] in triangles {
+        for (from, to) in [(a, b), (b, c), (c, a)] {
+            let (low, high, backward) = if from < to { (from, to, 0) } else { (to, from, 1) };
+            edges.push(u64::from(low) << 32 | u64::from(high) << 1 | backward);
+        }
+    }
+    edges.sort_unstable();
+    let mut faulty = Vec::new();
+    for same in edges.chunk_by(|a, b| a >> 1 == b >> 1) {
+        let backward = same.iter().filter(|&edge| edge & 1 == 1).count();
+        let balanced = backward * 2 == same.len();
+        match same.len() {
+            1 => faults.open_edges += 1,
+            2 => faults.inconsistent_edges += usize::from(!balanced),
+            _ => {
+                faults.non_manifold_edges += 1;
+                faults.inconsistent_edges += usize::from(!balanced);
+            }
+        }
+        if !balanced {
+            faulty.push((same[0] >> 32) as u32);
+        }
+    }
+    faulty
+}
+
+fn shells(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, faulty: &[u32]) -> Vec<Shell> {
+    let mut parent: Vec<u32> = (0..positions.len() as u32).collect();
+    fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
+        while parent[vertex as usize] != vertex {
+            let grandparent = parent[parent[vertex as usize] as usize];
+            parent[vertex as usize] = grandparent;
+            vertex = grandparent;
+        }
+        vertex
+    }
+    for &[a, b, c] in &triangles {
+        for other in [b, c] {
+            let (one, other) = (root(&mut parent, a), root(&mut parent, other));
+            parent[one.max(other) as usize] = one.min(other);
+        }
+    }
+    let mut number = vec![u32::MAX; positions.len()];
+    let mut shells: Vec<Shell> = Vec::new();
+    for triangle in triangles {
+        let root = root(&mut parent, triangle[0]) as usize;
+        if number[root] == u32::MAX {
+            number[root] = shells.len() as u32;
+            shells.push(Shell { triangles: Vec::new(), bounds: Bounds::EMPTY, closed: true, volume: 0.0 });
+        }
+        shells[number[root] as usize].triangles.push(triangle);
+    }
+    for &vertex in faulty {
+        let root = root(&mut parent, vertex) as usize;
+        shells[number[root] as usize].closed = false;
+    }
+    for shell in &mut shells {
+        let corners = shell.triangles.iter().flatten().map(|&vertex| place(positions, vertex));
+        shell.bounds = Bounds::around(corners);
+        let origin = shell.bounds.center();
+        let six_volumes = shell.triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|vertex| place(positions, vertex) - origin);
+            a.dot(b.cross(c))
+        });
+        shell.volume = six_volumes.sum::<f64>() / 6.0;
+    }
+    shells
+}
+
+/// Closed shells whose inside lies outside: negative volume, and not a cavity of a shell around them.
+fn inverted_shells(shells: &[Shell], positions: &[[f32; 3]]) -> usize {
+    let mut budget = WINDING_BUDGET;
+    let flat = |shell: &Shell| -1e-9 * shell.bounds.extent().max_element().powi(3);
+    let inside_out = shells.iter().enumerate().filter(|(_, shell)| shell.closed && shell.volume < flat(shell));
+    let is_inverted = |&(index, shell): &(usize, &Shell)| {
+        let point = place(positions, shell.triangles[0][0]);
+        let around = shells.iter().enumerate().filter(|&(other, around)| {
+            other != index && around.closed && around.volume > 0.0 && around.bounds.contains(point)
+        });
+        let winding: f64 = around
+            .map(|(_, around)| match budget.checked_sub(around.triangles.len()) {
+                Some(left) => {
+                    budget = left;
+                    winding_number(around, positions, point)
+                }
+                None => 1.0,
+            })
+            .sum();
+        winding < 0.5
+    };
+    inside_out.filter(is_inverted).count()
+}
+
+/// How often `shell` winds around `point`: the sum of its triangles' solid angles over 4 pi, after Van Oosterom and
+/// Strackee 1983, equation 8.
+fn winding_number(shell: &Shell, positions: &[[f32; 3]], point: DVec3) -> f64 {
+    let half_angles = shell.triangles.iter().map(|triangle| {
+        let [a, b, c] = triangle.map(|vertex| place(positions, vertex) - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        a.dot(b.cross(c)).atan2(denominator)
+    });
+    half_angles.sum::<f64>() / std::f64::consts::TAU
+}
+
+fn place(positions: &[[f32; 3]], vertex: u32) -> DVec3 {
+    let [x, y, z] = positions[vertex as usize];
+    DVec3::new(x.into(), y.into(), z.into())
+}

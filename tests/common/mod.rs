@@ -1,0 +1,50 @@
+//! What tests on a device share: one device under the validation layer, and its verdict.
+
+#![allow(dead_code, reason = "each test program uses its share")]
+
+pub mod reference;
+
+use std::sync::Arc;
+
+use vitrum::gpu::{Gpu, GpuError, Instance};
+
+/// A device under validation with synchronization validation. [`Validated::verdict`] ends every test.
+pub struct Validated {
+    pub gpu: Gpu,
+    pub instance: Arc<Instance>,
+}
+
+impl Validated {
+    /// The device named by `VITRUM_DEVICE`, or the best one. Without one the test is skipped, aloud; with
+    /// `VITRUM_REQUIRE_DEVICE` set, as in CI, it fails.
+    pub fn open() -> Option<Self> {
+        let wanted = std::env::var("VITRUM_DEVICE").ok();
+        let open = || -> Result<Self, GpuError> {
+            let instance = Instance::new(/* validation: */ true)?;
+            let device = instance.choose(wanted.as_deref())?;
+            Ok(Self { gpu: Gpu::open(&instance, device)?, instance })
+        };
+        match open() {
+            Ok(validated) => Some(validated),
+            Err(error) if std::env::var_os("VITRUM_REQUIRE_DEVICE").is_some() => panic!("{error}"),
+            Err(error) => {
+                eprintln!("skipped: no device ({error})");
+                None
+            }
+        }
+    }
+
+    /// Closes the device and the instance, and fails if the layer had anything to say, up to the last destruction.
+    pub fn verdict(self) {
+        let messages = self.messages();
+        assert!(messages.is_empty(), "{} validation messages:\n{}", messages.len(), messages.join("\n\n"));
+    }
+
+    /// Closes the device and the instance; what the layer said.
+    pub fn messages(self) -> Vec<String> {
+        let messages = self.instance.messages();
+        drop(self.gpu);
+        drop(self.instance);
+        messages.all()
+    }
+}
