@@ -19,7 +19,8 @@ fn main() -> Result<(), Box<dyn Error>> {
 
     let compiler = Compiler::new()?;
     let options = options(&folder)?;
-    let mut entries: Vec<_> = fs::read_dir(&folder)?.map(|file| Ok(file?.path())).collect::<Result<_, std::io::Error>>()?;
+    let mut entries: Vec<_> =
+        fs::read_dir(&folder)?.map(|file| Ok(file?.path())).collect::<Result<_, std::io::Error>>()?;
     entries.sort();
 
     let mut table = String::new();
@@ -32,7 +33,10 @@ fn main() -> Result<(), Box<dyn Error>> {
         fs::write(out.join(format!("{name}.spv")), spirv.as_binary_u8())?;
         let constant = name.replace('.', "_").to_uppercase();
         writeln!(table, "/// `shaders/{name}`")?;
-        writeln!(table, "pub const {constant}: Shader = Shader {{ name: {name:?}, spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")) }};")?;
+        writeln!(
+            table,
+            "pub const {constant}: Shader = Shader {{ name: {name:?}, spirv: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{name}.spv\")) }};"
+        )?;
     }
     fs::write(out.join("shaders.rs"), table)?;
     Ok(())

@@ -56,12 +56,7 @@ struct Row {
 const TABLE: [Row; 13] = {
     use Effect::*;
     use Model::Single;
-    const fn row(
-        effect: Effect,
-        name: &'static str,
-        models: &'static [Model],
-        called_for: fn(&Scene) -> bool,
-    ) -> Row {
+    const fn row(effect: Effect, name: &'static str, models: &'static [Model], called_for: fn(&Scene) -> bool) -> Row {
         Row { effect, name, models, called_for }
     }
     [
@@ -108,9 +103,10 @@ fn nests(scene: &Scene) -> bool {
         .filter(|object| matches!(scene.materials[object.material].surface, Surface::Dielectric(_)))
         .map(|object| scene.bounds_of(object))
         .collect();
-    boxes.iter().enumerate().any(|(i, a)| {
-        a.contains(scene.camera.position) || boxes[i + 1..].iter().any(|b| a.intersects(b))
-    })
+    boxes
+        .iter()
+        .enumerate()
+        .any(|(i, a)| a.contains(scene.camera.position) || boxes[i + 1..].iter().any(|b| a.intersects(b)))
 }
 
 impl Effect {

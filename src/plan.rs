@@ -66,7 +66,9 @@ impl Plan {
         aovs.dedup();
         if let Some(aov) = aovs.iter().find(|aov| !matches!(aov, Aov::Normal | Aov::Depth | Aov::Object)) {
             let name = aov.name();
-            return Err(Error::Usage(format!("--aov {name}: model single does not have it; it has: normal, depth, object")));
+            return Err(Error::Usage(format!(
+                "--aov {name}: model single does not have it; it has: normal, depth, object"
+            )));
         }
         let budget = match args.time_budget {
             Some(seconds) => Budget::Seconds { seconds, most: args.samples.unwrap_or(MOST_SAMPLES) },

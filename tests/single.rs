@@ -364,3 +364,19 @@ fn more_samples_converge_to_the_same_picture_whatever_the_seed() {
         assert!(many < few / 8.0, "seed {seed}: {few} with 4 samples, {many} with 64");
     }
 }
+
+/// Backs of closed bodies are not drawn; a body that is said to be open is drawn with them.
+#[test]
+fn leaving_out_the_backs_of_closed_bodies_changes_nothing() {
+    let mut scene = built_in(1.5);
+    // Mirrored bodies have their fronts the other way round.
+    scene.objects[0].transform = scene.objects[0].transform * glam::DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+    let Some((_, fronts)) = picture(&scene, sized(512, 384)) else { return };
+    for mesh in &mut scene.meshes {
+        mesh.faults.open_edges = 1;
+    }
+    let Some((_, both)) = picture(&scene, sized(512, 384)) else { return };
+    let differing = fronts.radiance.iter().zip(&both.radiance).filter(|(a, b)| a != b).count();
+    println!("{differing} pixels differ");
+    assert!(differing < 10);
+}

@@ -14,7 +14,9 @@ use crate::{Error, Result};
 /// Renders glass, and shows what accuracy costs
 #[derive(Debug, Parser)]
 #[command(name = "vitrum", version, max_term_width = 110, arg_required_else_help = true)]
-#[command(after_help = "Exit codes: 0 done; 1 a check that was asked for failed; 2 bad usage or bad input; 3 no usable Vulkan device.")]
+#[command(
+    after_help = "Exit codes: 0 done; 1 a check that was asked for failed; 2 bad usage or bad input; 3 no usable Vulkan device."
+)]
 struct Cli {
     #[command(subcommand)]
     command: Command,
@@ -98,7 +100,9 @@ fn report(error: &Error) {
 /// Prints a result; a reader that went away, as `head` does, is no failure.
 fn print(text: &str) -> Result<()> {
     match std::io::stdout().write_all(text.as_bytes()) {
-        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => Err(Error::file("standard output", "write", error)),
+        Err(error) if error.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::file("standard output", "write", error))
+        }
         _ => Ok(()),
     }
 }

@@ -165,11 +165,7 @@ fn float_image(rendered: Rendered, plan: &Plan) -> FloatImage {
 fn metadata(stats: &Stats, plan: &Plan) -> Vec<(String, String)> {
     let mut options = format!(
         "--model {} --size {} --samples {} --seed {} --effects {}",
-        stats.model,
-        plan.size,
-        stats.samples,
-        stats.seed,
-        plan.selection
+        stats.model, plan.size, stats.samples, stats.seed, plan.selection
     );
     options += &format!(" --exposure {} --tonemap {}", plan.exposure, plan.tonemap.name());
     let debug = &plan.debug;

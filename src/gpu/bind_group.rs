@@ -74,7 +74,9 @@ impl BindGroup {
                 .dst_set(group.set)
                 .dst_binding(binding)
                 .descriptor_type(resource.kind());
-            let image = |image: &Image, layout| [vk::DescriptorImageInfo::default().image_view(image.view).image_layout(layout)];
+            let image = |image: &Image, layout| {
+                [vk::DescriptorImageInfo::default().image_view(image.view).image_layout(layout)]
+            };
             // SAFETY: the set is not in use yet; resources and infos are alive.
             let update = |write| unsafe { gpu.device.update_descriptor_sets(&[write], &[]) };
             match resource {

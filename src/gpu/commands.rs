@@ -6,7 +6,8 @@ use bytemuck::NoUninit;
 use super::error::Context;
 use super::pipeline::Pipeline;
 use super::{
-    BindGroup, Buffer, BufferDesc, BufferUse, ComputePipeline, Gpu, GpuError, GraphicsPipeline, Image, ImageDesc, Result, Use,
+    BindGroup, Buffer, BufferDesc, BufferUse, ComputePipeline, Gpu, GpuError, GraphicsPipeline, Image, ImageDesc,
+    Result, Use,
 };
 
 /// Passes that one recording can time.
@@ -41,9 +42,8 @@ impl Commands {
             gpu: gpu.clone(),
         };
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.info().queue_family);
-        let queries = vk::QueryPoolCreateInfo::default()
-            .query_type(vk::QueryType::TIMESTAMP)
-            .query_count(2 * MAX_TIMED);
+        let queries =
+            vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2 * MAX_TIMED);
         // SAFETY: the infos point to locals; whatever fails, dropping `commands` destroys what was made and ignores nulls.
         unsafe {
             commands.pool = gpu.device.create_command_pool(&pool, None).context("vkCreateCommandPool")?;
@@ -150,7 +150,8 @@ impl Commands {
     }
 
     fn staging(&self, name: &str, bytes: &[u8]) -> Result<Buffer> {
-        let desc = BufferDesc { name: &format!("{name} on its way"), size: bytes.len() as u64, usage: BufferUse::Upload };
+        let desc =
+            BufferDesc { name: &format!("{name} on its way"), size: bytes.len() as u64, usage: BufferUse::Upload };
         let mut staging = Buffer::new(&self.gpu, &desc)?;
         if !staging.write(bytes) {
             let result = vk::Result::ERROR_MEMORY_MAP_FAILED;
@@ -203,7 +204,12 @@ impl Recorder<'_> {
             if clock {
                 // SAFETY: the query was reset when recording began, and is written once.
                 unsafe {
-                    recorder.device().cmd_write_timestamp2(buffer, vk::PipelineStageFlags2::ALL_COMMANDS, queries, query);
+                    recorder.device().cmd_write_timestamp2(
+                        buffer,
+                        vk::PipelineStageFlags2::ALL_COMMANDS,
+                        queries,
+                        query,
+                    );
                 }
             }
         };
@@ -263,9 +269,9 @@ impl Recorder<'_> {
                 Some(value) => {
                     self.overwrite_image(target.image, next);
                     info = info.load_op(vk::AttachmentLoadOp::CLEAR).clear_value(match next {
-                        Use::DepthTarget => vk::ClearValue {
-                            depth_stencil: vk::ClearDepthStencilValue { depth: value[0], stencil: 0 },
-                        },
+                        Use::DepthTarget => {
+                            vk::ClearValue { depth_stencil: vk::ClearDepthStencilValue { depth: value[0], stencil: 0 } }
+                        }
                         _ => vk::ClearValue { color: vk::ClearColorValue { float32: value } },
                     });
                 }
@@ -277,8 +283,7 @@ impl Recorder<'_> {
         let depth_info = depth.as_ref().map(|target| attach(target, Use::DepthTarget));
         let Some(extent) = colors.iter().chain(&depth).map(|target| target.image.extent).next() else { return };
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent };
-        let mut info =
-            vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color_infos);
+        let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color_infos);
         if let Some(depth) = &depth_info {
             info = info.depth_attachment(depth);
         }
@@ -380,6 +385,17 @@ fn rows(image: &Image, first: u32, count: u32) -> vk::BufferImageCopy {
         .image_extent(vk::Extent3D { width: image.extent.width, height: count, depth: 1 })
 }
 
+/// Which triangles are drawn, by the order of their corners as they are seen.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Sides {
+    /// All of them.
+    Both,
+    /// Fronts.
+    CounterClockwise,
+    /// Fronts of what is mirrored.
+    Clockwise,
+}
+
 /// Draws inside of [`Recorder::render`].
 pub struct RenderPass<'a> {
     commands: &'a Commands,
@@ -393,8 +409,8 @@ impl RenderPass<'_> {
         self.bound = Some(pipeline.inner().layout);
     }
 
-    /// Draws `vertices` vertices; nothing if no pipeline is bound.
-    pub fn draw<P: NoUninit>(&mut self, push: &P, vertices: u32) {
+    /// Draws `vertices` vertices, and the triangles that show `sides`; nothing if no pipeline is bound.
+    pub fn draw<P: NoUninit>(&mut self, push: &P, vertices: u32, sides: Sides) {
         let Some(layout) = self.bound else { return };
         let device = &self.commands.gpu.device;
         // SAFETY: a pipeline with this layout is bound inside of a rendering.
@@ -403,6 +419,13 @@ impl RenderPass<'_> {
             if !bytes.is_empty() {
                 device.cmd_push_constants(self.commands.buffer, layout, vk::ShaderStageFlags::ALL, 0, bytes);
             }
+            let (cull, front) = match sides {
+                Sides::Both => (vk::CullModeFlags::NONE, vk::FrontFace::COUNTER_CLOCKWISE),
+                Sides::CounterClockwise => (vk::CullModeFlags::BACK, vk::FrontFace::COUNTER_CLOCKWISE),
+                Sides::Clockwise => (vk::CullModeFlags::BACK, vk::FrontFace::CLOCKWISE),
+            };
+            device.cmd_set_cull_mode(self.commands.buffer, cull);
+            device.cmd_set_front_face(self.commands.buffer, front);
             device.cmd_draw(self.commands.buffer, vertices, 1, 0, 0);
         }
     }

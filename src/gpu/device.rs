@@ -42,8 +42,10 @@ impl Gpu {
         let priorities = [1.0];
         let queues =
             [vk::DeviceQueueCreateInfo::default().queue_family_index(info.queue_family).queue_priorities(&priorities)];
-        let mut vulkan13 =
-            vk::PhysicalDeviceVulkan13Features::default().dynamic_rendering(true).synchronization2(true).maintenance4(true);
+        let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .synchronization2(true)
+            .maintenance4(true);
         // SAFETY: the device was enumerated from this instance.
         let extensions = unsafe { instance.handle.enumerate_device_extension_properties(info.handle) }
             .context("vkEnumerateDeviceExtensionProperties")?;
@@ -51,11 +53,12 @@ impl Gpu {
         const PORTABILITY: &CStr = ash::khr::portability_subset::NAME;
         let subset = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(PORTABILITY));
         let enabled = if subset { vec![PORTABILITY.as_ptr()] } else { Vec::new() };
-        let create =
-            vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&enabled).push_next(&mut vulkan13);
+        let create = vk::DeviceCreateInfo::default()
+            .queue_create_infos(&queues)
+            .enabled_extension_names(&enabled)
+            .push_next(&mut vulkan13);
         // SAFETY: the features and the queue family were found on this device; the pointers are to locals.
-        let device =
-            unsafe { instance.handle.create_device(info.handle, &create, None) }.context("vkCreateDevice")?;
+        let device = unsafe { instance.handle.create_device(info.handle, &create, None) }.context("vkCreateDevice")?;
         // SAFETY: queue 0 of that family was just created.
         let queue = unsafe { device.get_device_queue(info.queue_family, 0) };
 

@@ -17,7 +17,9 @@ pub enum GpuError {
     },
 
     /// No driver, or no driver with a device.
-    #[error("no Vulkan device on this machine; install a driver (Debian, Ubuntu: mesa-vulkan-drivers) or run ci/setup.sh")]
+    #[error(
+        "no Vulkan device on this machine; install a driver (Debian, Ubuntu: mesa-vulkan-drivers) or run ci/setup.sh"
+    )]
     NoDevice,
 
     /// Every device lacks something.
@@ -43,7 +45,9 @@ pub enum GpuError {
     },
 
     /// The validation layer was asked for and is not installed.
-    #[error("--validation needs VK_LAYER_KHRONOS_validation; install it (Debian, Ubuntu: vulkan-validationlayers) or run ci/setup.sh")]
+    #[error(
+        "--validation needs VK_LAYER_KHRONOS_validation; install it (Debian, Ubuntu: vulkan-validationlayers) or run ci/setup.sh"
+    )]
     NoValidationLayer,
 
     /// More memory than the device has.

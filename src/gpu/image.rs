@@ -46,19 +46,15 @@ impl Use {
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
         match self {
             Self::Nothing => (Stage::NONE, Access::NONE),
-            Self::ColorTarget => (
-                Stage::COLOR_ATTACHMENT_OUTPUT,
-                Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE,
-            ),
+            Self::ColorTarget => {
+                (Stage::COLOR_ATTACHMENT_OUTPUT, Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE)
+            }
             Self::DepthTarget => (
                 Stage::EARLY_FRAGMENT_TESTS | Stage::LATE_FRAGMENT_TESTS,
                 Access::DEPTH_STENCIL_ATTACHMENT_READ | Access::DEPTH_STENCIL_ATTACHMENT_WRITE,
             ),
             Self::Sampled => (Stage::FRAGMENT_SHADER | Stage::COMPUTE_SHADER, Access::SHADER_SAMPLED_READ),
-            Self::Storage => (
-                Stage::COMPUTE_SHADER,
-                Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE,
-            ),
+            Self::Storage => (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE),
             Self::CopySource => (Stage::COPY, Access::TRANSFER_READ),
             Self::CopyTarget => (Stage::COPY, Access::TRANSFER_WRITE),
         }
@@ -174,7 +170,13 @@ impl Image {
     pub(super) fn range(&self) -> vk::ImageSubresourceRange {
         let depth = self.format == Format::D32_SFLOAT;
         let aspect_mask = if depth { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
-        vk::ImageSubresourceRange { aspect_mask, base_mip_level: 0, level_count: 1, base_array_layer: 0, layer_count: 1 }
+        vk::ImageSubresourceRange {
+            aspect_mask,
+            base_mip_level: 0,
+            level_count: 1,
+            base_array_layer: 0,
+            layer_count: 1,
+        }
     }
 
     /// Bytes of one texel.

@@ -127,8 +127,8 @@ impl Instance {
         let mut info = vk::InstanceCreateInfo::default().application_info(&application);
         if validation {
             // SAFETY: no arguments.
-            let found = unsafe { entry.enumerate_instance_layer_properties() }
-                .context("vkEnumerateInstanceLayerProperties")?;
+            let found =
+                unsafe { entry.enumerate_instance_layer_properties() }.context("vkEnumerateInstanceLayerProperties")?;
             if !found.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION)) {
                 return Err(GpuError::NoValidationLayer);
             }
@@ -152,8 +152,8 @@ impl Instance {
             let debug = ext::debug_utils::Instance::new(&instance._entry, &instance.handle);
             let info = messenger_info(&instance.messages);
             // SAFETY: the callback's user data is the `Messages` that this instance holds until it is destroyed.
-            let messenger = unsafe { debug.create_debug_utils_messenger(&info, None) }
-                .context("vkCreateDebugUtilsMessengerEXT")?;
+            let messenger =
+                unsafe { debug.create_debug_utils_messenger(&info, None) }.context("vkCreateDebugUtilsMessengerEXT")?;
             instance.debug = Some((debug, messenger));
         }
         Ok(Arc::new(instance))

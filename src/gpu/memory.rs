@@ -106,7 +106,8 @@ impl Buffer {
             });
         }
         // A CPU device's memory is the host's: nothing is gained by a copy.
-        let near = if gpu.info().kind == super::DeviceKind::Cpu { MemoryLocation::CpuToGpu } else { MemoryLocation::GpuOnly };
+        let near =
+            if gpu.info().kind == super::DeviceKind::Cpu { MemoryLocation::CpuToGpu } else { MemoryLocation::GpuOnly };
         use vk::BufferUsageFlags as Flags;
         let (flags, location) = match desc.usage {
             BufferUse::Storage => (Flags::STORAGE_BUFFER | Flags::TRANSFER_DST | Flags::TRANSFER_SRC, near),

@@ -18,7 +18,7 @@ mod shared;
 
 pub use ash::vk::Format;
 pub use bind_group::{Bind, BindGroup};
-pub use commands::{Commands, PassTime, Recorder, RenderPass, Target};
+pub use commands::{Commands, PassTime, Recorder, RenderPass, Sides, Target};
 pub use device::Gpu;
 pub use error::GpuError;
 pub use image::{Image, ImageDesc, Use};

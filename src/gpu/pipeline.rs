@@ -84,8 +84,7 @@ impl Pipeline {
     /// Its layout; the pipeline itself is still missing.
     fn new(gpu: &Gpu, group: &BindGroup, push_bytes: u32) -> Result<Self> {
         let sets = [group.layout];
-        let ranges =
-            [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::ALL, offset: 0, size: push_bytes }];
+        let ranges = [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::ALL, offset: 0, size: push_bytes }];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
         let info = if push_bytes > 0 { info.push_constant_ranges(&ranges) } else { info };
         // SAFETY: the set's layout is alive; 128 bytes of push constants are guaranteed and none uses more.
@@ -105,7 +104,7 @@ impl Drop for Pipeline {
 }
 
 impl GraphicsPipeline {
-    /// A pipeline for render passes with these targets. Both sides of a triangle are drawn.
+    /// A pipeline for render passes with these targets.
     pub fn new(gpu: &Gpu, desc: &GraphicsPipelineDesc<'_>) -> Result<Self> {
         let mut pipeline = Pipeline::new(gpu, desc.group, desc.push_bytes)?;
         let (vertex, fragment) = (Module::new(gpu, desc.vertex)?, Module::new(gpu, desc.fragment)?);
@@ -121,12 +120,10 @@ impl GraphicsPipeline {
         let assembly =
             vk::PipelineInputAssemblyStateCreateInfo::default().topology(vk::PrimitiveTopology::TRIANGLE_LIST);
         let viewport = vk::PipelineViewportStateCreateInfo::default().viewport_count(1).scissor_count(1);
-        let raster = vk::PipelineRasterizationStateCreateInfo::default()
-            .polygon_mode(vk::PolygonMode::FILL)
-            .cull_mode(vk::CullModeFlags::NONE)
-            .line_width(1.0);
-        let samples = vk::PipelineMultisampleStateCreateInfo::default()
-            .rasterization_samples(vk::SampleCountFlags::TYPE_1);
+        let raster =
+            vk::PipelineRasterizationStateCreateInfo::default().polygon_mode(vk::PolygonMode::FILL).line_width(1.0);
+        let samples =
+            vk::PipelineMultisampleStateCreateInfo::default().rasterization_samples(vk::SampleCountFlags::TYPE_1);
         let depth = vk::PipelineDepthStencilStateCreateInfo::default()
             .depth_test_enable(desc.depth != Depth::Ignored)
             .depth_write_enable(desc.depth == Depth::Nearest)
@@ -134,12 +131,15 @@ impl GraphicsPipeline {
                 Depth::Nearest | Depth::Ignored => vk::CompareOp::GREATER,
                 Depth::Behind => vk::CompareOp::GREATER_OR_EQUAL,
             });
-        let opaque =
-            vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
+        let opaque = vk::PipelineColorBlendAttachmentState::default().color_write_mask(vk::ColorComponentFlags::RGBA);
         let blends = vec![opaque; desc.colors.len()];
         let blend = vk::PipelineColorBlendStateCreateInfo::default().attachments(&blends);
-        let dynamic = vk::PipelineDynamicStateCreateInfo::default()
-            .dynamic_states(&[vk::DynamicState::VIEWPORT, vk::DynamicState::SCISSOR]);
+        let dynamic = vk::PipelineDynamicStateCreateInfo::default().dynamic_states(&[
+            vk::DynamicState::VIEWPORT,
+            vk::DynamicState::SCISSOR,
+            vk::DynamicState::CULL_MODE,
+            vk::DynamicState::FRONT_FACE,
+        ]);
         let depth_format = if desc.depth == Depth::Ignored { Format::UNDEFINED } else { Format::D32_SFLOAT };
         let mut targets = vk::PipelineRenderingCreateInfo::default()
             .color_attachment_formats(desc.colors)

@@ -28,7 +28,8 @@ pub(super) struct Module<'a> {
 
 impl<'a> Module<'a> {
     pub(super) fn new(gpu: &'a Gpu, shader: &Shader) -> Result<Self> {
-        let words: Vec<u32> = shader.spirv.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let words: Vec<u32> =
+            shader.spirv.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the code is what shaderc made for Vulkan 1.3.
         let handle = unsafe { gpu.device.create_shader_module(&info, None) }.context("vkCreateShaderModule")?;

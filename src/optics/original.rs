@@ -101,7 +101,8 @@ mod tests {
         let normal = DVec3::Y;
         for degrees in [0.0_f64, 10.0, 45.0, 80.0, 89.9] {
             let (sine, cosine) = degrees.to_radians().sin_cos();
-            let refracted = transmission_dir(DVec3::new(sine, cosine, 0.0), normal, 1.5, false).expect("no total reflection");
+            let refracted =
+                transmission_dir(DVec3::new(sine, cosine, 0.0), normal, 1.5, false).expect("no total reflection");
             assert!((refracted.length() - 1.0).abs() < 1e-12);
             assert!((refracted.x + sine / 1.5).abs() < 1e-12 && refracted.y < 0.0);
         }

@@ -3,8 +3,8 @@
 use super::resources::Resources;
 use super::view;
 use crate::gpu::{
-    Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result, SamplePush,
-    Target, Use, shaders,
+    Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
+    SamplePush, Target, Use, shaders,
 };
 use crate::options::Size;
 use glam::DVec2;
@@ -55,7 +55,8 @@ impl AovPass {
         let uses = &[Use::ColorTarget, Use::CopySource];
         let image = |name| Image::new(&gpu, &ImageDesc { name, width, height, format: VALUES, uses });
         let (normal_depth, object) = (image("normal and depth")?, image("object")?);
-        let desc = ImageDesc { name: "depth of aov", width, height, format: Format::D32_SFLOAT, uses: &[Use::DepthTarget] };
+        let desc =
+            ImageDesc { name: "depth of aov", width, height, format: Format::D32_SFLOAT, uses: &[Use::DepthTarget] };
         let depth = Image::new(&gpu, &desc)?;
         let clear = Some([0.0; 4]);
         let push = view::sample_push(size, DVec2::ZERO);
@@ -64,14 +65,15 @@ impl AovPass {
                 let colors = [Target { image: &normal_depth, clear }, Target { image: &object, clear }];
                 cmd.render(&colors, Some(Target { image: &depth, clear }), |pass| {
                     pass.bind(&self.pipeline, &resources.group);
-                    for (instance_index, &vertices) in (0..).zip(&resources.draws) {
-                        pass.draw(&SamplePush { instance_index, ..push }, vertices);
+                    for (instance_index, draw) in (0..).zip(&resources.draws) {
+                        pass.draw(&SamplePush { instance_index, ..push }, draw.vertices, draw.sides);
                     }
                 });
             });
         })?;
         let texels = |bytes: Vec<u8>| bytemuck::allocation::pod_collect_to_vec::<u8, [f32; 4]>(&bytes);
-        let (normal_depth, object) = (texels(commands.read_image(&normal_depth)?), texels(commands.read_image(&object)?));
+        let (normal_depth, object) =
+            (texels(commands.read_image(&normal_depth)?), texels(commands.read_image(&object)?));
         let metres = |length: f32| (f64::from(length) * resources.metres_per_unit) as f32;
         let aovs = Aovs {
             normal: normal_depth.iter().map(|&[x, y, z, _]| [x, y, z]).collect(),

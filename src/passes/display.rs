@@ -4,8 +4,8 @@ use bytemuck::{Pod, Zeroable};
 
 use super::Targets;
 use crate::gpu::{
-    Bind, BindGroup, Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
-    Specialization, Target, Use, shaders,
+    Bind, BindGroup, Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime,
+    Result, Sides, Specialization, Target, Use, shaders,
 };
 use crate::plan::Plan;
 
@@ -70,7 +70,7 @@ impl Display {
                 cmd.use_image(&targets.total, Use::Sampled);
                 cmd.render(&[Target { image: &screen, clear: Some([0.0; 4]) }], None, |pass| {
                     pass.bind(&self.pipeline, &targets.display);
-                    pass.draw(&push, 3);
+                    pass.draw(&push, 3, Sides::Both);
                 });
             });
         })?;

@@ -2,7 +2,9 @@
 
 use super::resources::Resources;
 use super::{RADIANCE, Targets};
-use crate::gpu::{Depth, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Recorder, Result, SamplePush, Target, shaders};
+use crate::gpu::{
+    Depth, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Recorder, Result, SamplePush, Sides, Target, shaders,
+};
 
 pub(super) struct EnvironmentPass {
     pipeline: GraphicsPipeline,
@@ -31,7 +33,7 @@ impl EnvironmentPass {
         let depth = Target { image: &targets.depth, clear: None };
         cmd.render(&[color], Some(depth), |pass| {
             pass.bind(&self.pipeline, &resources.group);
-            pass.draw(&push, 3);
+            pass.draw(&push, 3, Sides::Both);
         });
     }
 }

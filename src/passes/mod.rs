@@ -102,7 +102,7 @@ impl Passes {
         let small = Size { width: 16, height: 16 };
         let targets = Targets::new(&gpu, small)?;
         let passes = Self {
-            single: Single::new(&gpu, resources, plan)?,
+            single: Single::new(&gpu, resources)?,
             environment: EnvironmentPass::new(&gpu, resources)?,
             accumulate: Accumulate::new(&gpu, &targets)?,
             display: Display::new(&gpu, &targets)?,

@@ -8,8 +8,8 @@ use half::f16;
 use super::view::View;
 use crate::effects::Effect;
 use crate::gpu::{
-    Bind, BindGroup, Buffer, Commands, Format, Frame, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord, Result,
-    Specialization, Use,
+    Bind, BindGroup, Buffer, Commands, Format, Frame, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord,
+    Result, Sides, Specialization, Use,
 };
 use crate::plan::Plan;
 use crate::scene::{Dielectric, Mesh, Panorama, Scene, Surface, Surroundings};
@@ -20,8 +20,8 @@ const ENVIRONMENT_IMAGE: u32 = 64;
 /// Buffers and images that every pass sees, as one group. The buffers are held so that the group stays valid.
 pub(super) struct Resources {
     pub(super) group: Rc<BindGroup>,
-    /// Vertices of each instance.
-    pub(super) draws: Vec<u32>,
+    /// The instances, in their order.
+    pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
     /// From lengths on the device to metres.
     pub(super) metres_per_unit: f64,
@@ -65,12 +65,19 @@ impl Resources {
     pub(super) fn few(&self) -> Self {
         Self {
             group: Rc::clone(&self.group),
-            draws: self.draws.iter().take(1).map(|&count| count.min(3)).collect(),
+            draws: self.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect(),
             specialization: self.specialization.clone(),
             metres_per_unit: self.metres_per_unit,
             held: Rc::clone(&self.held),
         }
     }
+}
+
+/// An instance, as it is drawn.
+#[derive(Clone, Copy)]
+pub(super) struct Draw {
+    pub(super) vertices: u32,
+    pub(super) sides: Sides,
 }
 
 /// Every mesh once, and the instances of them that are dielectrics.
@@ -80,14 +87,15 @@ struct Geometry {
     normals: Vec<f32>,
     triangles: Vec<u32>,
     instances: Vec<InstanceRecord>,
-    draws: Vec<u32>,
+    draws: Vec<Draw>,
 }
 
 impl Geometry {
     fn new(scene: &Scene, view: &View) -> Self {
         let mut all = Self::default();
         let places: Vec<_> = scene.meshes.iter().map(|mesh| all.add(mesh)).collect();
-        let to_device = DAffine3::from_scale(DVec3::splat(view.units_per_metre)) * DAffine3::from_translation(-view.position);
+        let to_device =
+            DAffine3::from_scale(DVec3::splat(view.units_per_metre)) * DAffine3::from_translation(-view.position);
         for object in &scene.objects {
             if matches!(scene.materials[object.material].surface, Surface::Opaque(_)) {
                 continue;
@@ -107,7 +115,16 @@ impl Geometry {
                 smooth_normals: u32::from(object.smooth && !mesh.normals.is_empty()),
                 number: object.number as u32 + 1,
             });
-            all.draws.push(3 * mesh.triangles.len() as u32);
+            let mirrored = object_to_world.matrix3.determinant() < 0.0;
+            all.draws.push(Draw {
+                vertices: 3 * mesh.triangles.len() as u32,
+                // What is nearest of such a body is a front: leaving out the backs changes nothing but the time.
+                sides: match (scene.is_seen_from_outside(object), mirrored) {
+                    (false, _) => Sides::Both,
+                    (true, false) => Sides::CounterClockwise,
+                    (true, true) => Sides::Clockwise,
+                },
+            });
         }
         all
     }

@@ -19,9 +19,10 @@ pub(super) fn pixel_offsets(budget: Budget, seed: u64) -> Box<dyn Iterator<Item 
     let shift = shift(seed);
     let place = move |point: DVec2| (point + shift).fract_gl() - 0.5;
     match budget {
-        Budget::Samples(count) => Box::new((0..count).map(move |i| {
-            place(DVec2::new((f64::from(i) + 0.5) / f64::from(count), 0.5 + f64::from(i) * GOLDEN))
-        })),
+        Budget::Samples(count) => Box::new(
+            (0..count)
+                .map(move |i| place(DVec2::new((f64::from(i) + 0.5) / f64::from(count), 0.5 + f64::from(i) * GOLDEN))),
+        ),
         Budget::Seconds { most, .. } => Box::new((0..most).map(move |i| place(0.5 + f64::from(i) * PLASTIC))),
     }
 }

@@ -3,14 +3,13 @@
 use super::resources::Resources;
 use super::{RADIANCE, Targets};
 use crate::gpu::{Depth, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Recorder, Result, SamplePush, Target, shaders};
-use crate::plan::Plan;
 
 pub(super) struct Single {
     pipeline: GraphicsPipeline,
 }
 
 impl Single {
-    pub(super) fn new(gpu: &Gpu, resources: &Resources, _plan: &Plan) -> Result<Self> {
+    pub(super) fn new(gpu: &Gpu, resources: &Resources) -> Result<Self> {
         let pipeline = GraphicsPipeline::new(
             gpu,
             &GraphicsPipelineDesc {
@@ -32,8 +31,8 @@ impl Single {
         let depth = Target { image: &targets.depth, clear: Some([0.0; 4]) };
         cmd.render(&[color], Some(depth), |pass| {
             pass.bind(&self.pipeline, &resources.group);
-            for (instance_index, &vertices) in (0..).zip(&resources.draws) {
-                pass.draw(&SamplePush { instance_index, ..push }, vertices);
+            for (instance_index, draw) in (0..).zip(&resources.draws) {
+                pass.draw(&SamplePush { instance_index, ..push }, draw.vertices, draw.sides);
             }
         });
     }

@@ -69,7 +69,8 @@ impl Stats {
     /// Those of one render; `load` is the time that it took to read the scene. What is only known at the very end is still
     /// missing: see [`finish`](Self::finish).
     pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, load: Duration) -> Self {
-        let passes: Vec<_> = rendered.passes.iter().map(|&PassTime { name, gpu_ms }| PassStats { name, gpu_ms }).collect();
+        let passes: Vec<_> =
+            rendered.passes.iter().map(|&PassTime { name, gpu_ms }| PassStats { name, gpu_ms }).collect();
         let finite = |pixel: &&[f32; 3]| pixel.iter().all(|value| value.is_finite());
         Self {
             schema: 1,

@@ -8,6 +8,7 @@ mod assembly;
 mod bounds;
 mod builtin;
 mod camera;
+mod containment;
 mod environment;
 mod file;
 mod files;

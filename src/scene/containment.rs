@@ -1,0 +1,75 @@
+//! Which side of a surface one is on. In flow a scene and a point, out flows whether it lies inside of a body.
+
+use std::f64::consts::TAU;
+
+use glam::DVec3;
+
+use super::{Mesh, Object, Scene};
+
+impl Mesh {
+    /// How often the surface winds around `point`, in the mesh's space: 1 inside of a closed mesh, 0 outside and in its
+    /// cavities.
+    pub fn winding_number(&self, point: DVec3) -> f64 {
+        let corner = |index: u32| DVec3::from_array(self.positions[index as usize].map(f64::from)) - point;
+        let angles = self.triangles.iter().map(|&[a, b, c]| solid_angle(corner(a), corner(b), corner(c)));
+        angles.sum::<f64>() / (2.0 * TAU)
+    }
+}
+
+/// The part of the unit sphere that a triangle covers, seen from the origin, positive where its outside is turned away:
+/// van Oosterom & Strackee 1983.
+fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let (la, lb, lc) = (a.length(), b.length(), c.length());
+    let volume = a.dot(b.cross(c));
+    let product = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+    2.0 * volume.atan2(product)
+}
+
+impl Scene {
+    /// Whether the camera sees `object` from its outside only: the mesh is closed, the right way round, and the camera is
+    /// not in the body.
+    pub fn is_seen_from_outside(&self, object: &Object) -> bool {
+        let mesh = &self.meshes[object.mesh];
+        if !mesh.faults.is_closed() || mesh.faults.inverted_shells > 0 {
+            return false;
+        }
+        let camera = object.transform.inverse().transform_point3(self.camera.position);
+        !mesh.bounds().contains(camera) || mesh.winding_number(camera).abs() < 0.5
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Overrides;
+
+    #[test]
+    fn a_body_winds_once_around_its_inside_and_not_around_its_cavity() {
+        let scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        let teapot = &scene.meshes[scene.objects[0].mesh];
+        // In units of 10 cm: the wall is 2.5 mm thick, the middle of the pot is hollow.
+        for (point, expected) in
+            [(DVec3::new(0.0, 0.4, 0.0), 0.0), (DVec3::new(5.0, 0.4, 0.0), 0.0), (wall_of(teapot), 1.0)]
+        {
+            let found = teapot.winding_number(point);
+            assert!((found - expected).abs() < 1e-9, "{point}: {found}");
+        }
+    }
+
+    /// A point just beneath the surface.
+    fn wall_of(mesh: &Mesh) -> DVec3 {
+        let [a, b, c] = mesh.triangles[0].map(|i| DVec3::from_array(mesh.positions[i as usize].map(f64::from)));
+        (a + b + c) / 3.0 - 0.001 * (b - a).cross(c - a).normalize()
+    }
+
+    #[test]
+    fn the_camera_in_the_hollow_is_outside_of_the_glass() {
+        let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        assert!(scene.objects.iter().all(|object| scene.is_seen_from_outside(object)));
+        let pot = scene.objects[0].clone();
+        scene.camera.position = pot.transform.transform_point3(DVec3::new(0.0, 0.4, 0.0));
+        assert!(scene.is_seen_from_outside(&pot));
+        scene.camera.position = pot.transform.transform_point3(wall_of(&scene.meshes[pot.mesh]));
+        assert!(!scene.is_seen_from_outside(&pot));
+    }
+}
