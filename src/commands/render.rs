@@ -18,6 +18,7 @@ use crate::{Error, Result};
 
 /// Options of `vitrum render`.
 #[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
 pub(super) struct RenderCommand {
     /// A .toml scene, or a bare .obj shown as clear glass; none: the built-in teapot and cups
     scene: Option<PathBuf>,
@@ -57,23 +58,26 @@ impl RenderCommand {
             environment: self.options.env.clone(),
         };
         let scene = Scene::load(self.scene.as_deref(), &overrides)?;
-        for warning in &scene.warnings {
-            talk.note(&format!("warning: {warning}"));
-        }
         let load = start.elapsed();
-        notes(&self.options, format, talk);
+        let idle = idle_options(&self.options, format);
         let args = self.options.or(scene.render.clone());
         let plan = Plan::new(&scene, &args)?;
         if format == ImageFormat::Png && !plan.aovs.is_empty() {
             return Err(Error::Usage("--aov adds layers to an EXR; name the output .exr".into()));
         }
+        let instance = Instance::new(self.validation)?;
+        let gpu = Gpu::open(&instance, instance.choose(args.device.as_deref())?)?;
+
+        for warning in &scene.warnings {
+            talk.note(&format!("warning: {warning}"));
+        }
+        for note in idle {
+            talk.note(&note);
+        }
         if plan.unsupported != Default::default() {
             let (model, names) = (plan.model.name(), plan.unsupported.names().join(", "));
             talk.note(&format!("note: model {model} does not simulate what the scene calls for: {names}"));
         }
-
-        let instance = Instance::new(self.validation)?;
-        let gpu = Gpu::open(&instance, instance.choose(args.device.as_deref())?)?;
         let device = gpu.info().clone();
         talk.detail(&format!("device: {} ({})", device.name, device.driver));
         let bar = progress_bar(&plan, talk);
@@ -115,19 +119,19 @@ impl RenderCommand {
     }
 }
 
-/// Options that are understood and change nothing here.
-fn notes(options: &RenderArgs, format: ImageFormat, talk: Talk) {
+/// Notes on options that are understood and change nothing here.
+fn idle_options(options: &RenderArgs, format: ImageFormat) -> Vec<String> {
     let exr = format == ImageFormat::Exr;
-    for (given, name, why) in [
+    [
         (options.max_depth.is_some(), "--max-depth", "model single sees one interface"),
         (options.trace.is_some(), "--trace", "model single traces no rays"),
         (exr && options.exposure.is_some(), "--exposure", "an EXR holds radiance as it is"),
         (exr && options.tonemap.is_some(), "--tonemap", "an EXR holds radiance as it is"),
-    ] {
-        if given {
-            talk.note(&format!("note: {name} changes nothing: {why}"));
-        }
-    }
+    ]
+    .into_iter()
+    .filter(|(given, ..)| *given)
+    .map(|(_, name, why)| format!("note: {name} changes nothing: {why}"))
+    .collect()
 }
 
 fn progress_bar(plan: &Plan, talk: Talk) -> ProgressBar {

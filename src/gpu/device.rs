@@ -77,7 +77,7 @@ impl Gpu {
             Err(error) => {
                 // SAFETY: nothing was made on the device yet.
                 unsafe { device.destroy_device(None) };
-                return Err(GpuError::OutOfMemory { what: "the allocator".into(), bytes: 0, state: error.to_string() });
+                return Err(GpuError::OutOfMemory { what: "the allocator".into(), state: error.to_string() });
             }
         };
         let names = instance.validates().then(|| ext::debug_utils::Device::new(&instance.handle, &device));

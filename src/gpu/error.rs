@@ -51,12 +51,10 @@ pub enum GpuError {
     NoValidationLayer,
 
     /// More memory than the device has.
-    #[error("out of device memory: {what} needs {} MiB and {}; use a smaller --size or another --device", .bytes >> 20, .state)]
+    #[error("out of device memory: {what}: {state}; use a smaller --size or another --device")]
     OutOfMemory {
-        /// What it was for.
+        /// What it was for, with its size if that is known.
         what: String,
-        /// Its size.
-        bytes: u64,
         /// How much there is, or what the driver said.
         state: String,
     },
@@ -108,7 +106,7 @@ impl<T> Context<T> for Result<T, vk::Result> {
         self.map_err(|result| match result {
             vk::Result::ERROR_DEVICE_LOST => GpuError::Lost,
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
-                GpuError::OutOfMemory { what: call.into(), bytes: 0, state: result.to_string() }
+                GpuError::OutOfMemory { what: call.into(), state: result.to_string() }
             }
             result => GpuError::Call { call, result },
         })

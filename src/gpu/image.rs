@@ -7,6 +7,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
 use super::error::Context;
+use super::memory::bound;
 use super::{Gpu, GpuError, Result};
 
 /// What an image is used for next. [`Recorder::use_image`](super::Recorder::use_image) waits for the use before.
@@ -142,9 +143,9 @@ impl Image {
         let allocation = gpu.allocate(desc.name, requirements, MemoryLocation::GpuOnly, /* linear: */ false)?;
         // SAFETY: memory and offset come from the allocator for these very requirements; bound once, and kept until the
         // image is destroyed.
-        let bound = unsafe { gpu.device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
+        let result = unsafe { gpu.device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
-        bound.context("vkBindImageMemory")?;
+        bound(desc.name, requirements.size, result)?;
         let view = vk::ImageViewCreateInfo::default()
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)

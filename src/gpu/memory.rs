@@ -31,7 +31,7 @@ impl Open {
         location: MemoryLocation,
         linear: bool,
     ) -> Result<Allocation> {
-        let out_of_memory = |state| GpuError::OutOfMemory { what: name.into(), bytes: requirements.size, state };
+        let out_of_memory = |state| out_of_memory(name, requirements.size, state);
         let mut ledger = self.lock_ledger();
         let heap = self.heap();
         if ledger.now.saturating_add(requirements.size) > heap {
@@ -60,6 +60,20 @@ impl Open {
         // It fails only for an allocation of another allocator.
         let _ = self.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation);
     }
+}
+
+/// Some drivers find out only when memory is bound.
+pub(super) fn bound(name: &str, size: u64, result: Result<(), vk::Result>) -> Result<()> {
+    result.map_err(|result| match result {
+        vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
+            out_of_memory(name, size, "the driver has no more".into())
+        }
+        result => GpuError::Call { call: "vkBindMemory", result },
+    })
+}
+
+fn out_of_memory(name: &str, size: u64, state: String) -> GpuError {
+    GpuError::OutOfMemory { what: format!("{name} needs {} MiB", size >> 20), state }
 }
 
 /// What a buffer is for.
@@ -125,9 +139,9 @@ impl Buffer {
         let allocation = gpu.allocate(desc.name, requirements, location, /* linear: */ true)?;
         // SAFETY: memory and offset come from the allocator for these very requirements; bound once, and kept until the
         // buffer is destroyed.
-        let bound = unsafe { gpu.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+        let result = unsafe { gpu.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
         buffer.allocation = Some(allocation);
-        bound.context("vkBindBufferMemory")?;
+        bound(desc.name, requirements.size, result)?;
         Ok(buffer)
     }
 

@@ -14,7 +14,7 @@ mod view;
 
 use std::time::{Duration, Instant};
 
-use crate::gpu::{Commands, Format, Gpu, Image, ImageDesc, PassTime, Recorder, Result, SamplePush, Use};
+use crate::gpu::{Commands, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Recorder, Result, SamplePush, Use};
 use crate::options::Size;
 use crate::plan::{Budget, Plan};
 use crate::scene::Scene;
@@ -53,6 +53,15 @@ pub struct Rendered {
 /// Renders `scene` as `plan` says. `progress` hears how many samples are done, of how many.
 pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
     let start = Instant::now();
+    let limit = gpu.max_image_side();
+    if plan.size.width.max(plan.size.height) > limit {
+        return Err(GpuError::TooLarge {
+            what: "--size".into(),
+            size: plan.size.to_string(),
+            limit: format!("{limit} a side"),
+            advice: "use a smaller --size",
+        });
+    }
     let mut commands = Commands::new(gpu)?;
     let resources = Resources::new(&mut commands, scene, plan)?;
     let upload = start.elapsed();
