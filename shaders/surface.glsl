@@ -28,7 +28,8 @@ uvec3 FetchTriangle(Instance instance, uint triangle)
 }
 
 // Where the camera's ray along `direction` meets the plane of `triangle`: Moeller & Trumbore 1997, in the mesh's space.
-Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
+// `front`: the triangle shows its outside.
+Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction, bool front)
 {
     uvec3 vertices = FetchTriangle(instance, triangle);
     vec3 corner = FetchPosition(vertices.x);
@@ -44,21 +45,20 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
     Hit hit;
     hit.t = dot(edge2, q) * inverse;
     hit.position = hit.t * direction;
-    vec3 normal = cross(edge1, edge2);
+    vec3 normal = normalize(cross(edge1, edge2));
     if (instance.smoothNormals != 0) {
-        // A pixel's centre may lie just outside of the triangle that the rasteriser chose, and far outside of one seen on edge.
-        float b1 = clamp(dot(fromCorner, p) * inverse, 0.0, 1.0);
-        float b2 = clamp(dot(ray, q) * inverse, 0.0, 1.0 - b1);
+        // A pixel's centre may lie just outside of the triangle that the rasteriser chose, where normals go on as they are
+        // inside, and far outside of one seen on edge.
+        float b1 = clamp(dot(fromCorner, p) * inverse, -1.0, 2.0);
+        float b2 = clamp(dot(ray, q) * inverse, -1.0, 2.0);
         vec3 first = FetchNormal(vertices.x);
-        vec3 blended = first + b1 * (FetchNormal(vertices.y) - first) + b2 * (FetchNormal(vertices.z) - first);
-        // An interpolated normal that faces away from the viewer although its face does not, at silhouettes, is bent to
-        // just above the horizon.
-        vec3 towards = -normalize(ray);
-        float cosine = dot(normalize(blended), towards);
-        bool front = dot(normal, towards) > 0.0;
-        if (front && cosine < 1e-4) blended = normalize(blended) + (1e-3 - cosine) * towards;
-        normal = blended;
+        normal = normalize(first + b1 * (FetchNormal(vertices.y) - first) + b2 * (FetchNormal(vertices.z) - first));
     }
+    // At silhouettes an interpolated normal may face away from the viewer although its face does not, and so may a rounded
+    // one of the face itself: it is bent to just above the horizon.
+    vec3 towards = -normalize(ray);
+    float cosine = dot(normal, towards);
+    if (front && cosine < 1e-4) normal += (1e-3 - cosine) * towards;
     hit.normal = normalize(mat3(instance.normalToWorld) * normal);
     return hit;
 }

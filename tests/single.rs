@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use glam::{DVec2, DVec3};
 
 use common::Validated;
-use common::reference::Reference;
+use common::reference::{Hit, Reference};
 use vitrum::options::{Aov, RenderArgs, Size};
 use vitrum::passes::{Rendered, render};
 use vitrum::plan::Plan;
@@ -21,6 +21,11 @@ fn picture(scene: &Scene, args: RenderArgs) -> Option<(Plan, Rendered)> {
     let rendered = render(&validated.gpu, scene, &plan, &mut |_, _| {}).expect("a picture");
     validated.verdict();
     Some((plan, rendered))
+}
+
+/// How far from its true place, in pixels, the rasteriser may put an edge; 0 without a device.
+fn snap() -> f64 {
+    Validated::open().map_or(0.0, |validated| 0.5_f64.powi(validated.gpu.info().sub_pixel_bits as i32))
 }
 
 fn sized(width: u32, height: u32) -> RenderArgs {
@@ -82,17 +87,24 @@ fn worst_difference(name: &str, scene: &Scene, args: RenderArgs) {
     let flipped = args.flipped_ratio == Some(true);
     let Some((plan, rendered)) = picture(scene, args) else { return };
     let reference = Reference::new(scene, plan.size);
+    let snap = snap();
     let (mut worst, mut place, mut counted) = (0.0, (0, 0), 0);
     for y in 0..plan.size.height {
         for x in 0..plan.size.width {
             let centre = DVec2::new(f64::from(x) + 0.5, f64::from(y) + 0.5);
             let direction = reference.ray(centre);
             let Some(hit) = reference.hit(direction) else { continue };
-            // The rasteriser snaps corners to a fraction of a pixel: next to an edge it may see what lies beyond.
-            let near = [(0.25, 0.25), (-0.25, 0.25), (0.25, -0.25), (-0.25, -0.25)];
-            let beside = near.map(|(dx, dy)| reference.hit(reference.ray(centre + DVec2::new(dx, dy))));
-            let inside = beside.iter().all(|other| other.is_some_and(|other| other.normal.dot(hit.normal) > 0.9));
-            if !inside || hit.normal.dot(-direction) < 0.02 {
+            if hit.normal.dot(-direction) < 0.02 {
+                continue;
+            }
+            let around = |distance: f64| {
+                [(1.0, 1.0), (-1.0, 1.0), (1.0, -1.0), (-1.0, -1.0)]
+                    .map(|(x, y)| reference.hit(reference.ray(centre + distance * DVec2::new(x, y))))
+            };
+            // Away from silhouettes, and where the rasteriser cannot take the next triangle for this one.
+            let inside = |other: Option<Hit>| other.is_some_and(|other| other.normal.dot(hit.normal) > 0.9);
+            let same = |other: Option<Hit>| other.is_some_and(|other| other.triangle == hit.triangle);
+            if !around(0.25).into_iter().all(inside) || !around(snap).into_iter().all(same) {
                 continue;
             }
             let expected = reference.shade(&hit, direction, flipped);
@@ -352,7 +364,7 @@ fn debug_controls_do_what_the_report_says() {
 fn more_samples_converge_to_the_same_picture_whatever_the_seed() {
     let scene = built_in(1.5);
     let args = |samples, seed| RenderArgs { samples: Some(samples), seed: Some(seed), ..sized(64, 48) };
-    let Some((_, truth)) = picture(&scene, args(1024, 0)) else { return };
+    let Some((_, truth)) = picture(&scene, args(400, 0)) else { return };
     let error = |samples, seed| {
         let (_, found) = picture(&scene, args(samples, seed)).expect("a picture");
         let pairs = found.radiance.iter().flatten().zip(truth.radiance.iter().flatten());
@@ -360,8 +372,8 @@ fn more_samples_converge_to_the_same_picture_whatever_the_seed() {
         sum / (64.0 * 48.0 * 3.0)
     };
     for seed in [0, 1, 2] {
-        let (few, many) = (error(4, seed), error(64, seed));
-        assert!(many < few / 8.0, "seed {seed}: {few} with 4 samples, {many} with 64");
+        let (few, many) = (error(4, seed), error(36, seed));
+        assert!(many < few / 5.0, "seed {seed}: {few} with 4 samples, {many} with 36");
     }
 }
 

@@ -385,15 +385,13 @@ fn rows(image: &Image, first: u32, count: u32) -> vk::BufferImageCopy {
         .image_extent(vk::Extent3D { width: image.extent.width, height: count, depth: 1 })
 }
 
-/// Which triangles are drawn, by the order of their corners as they are seen.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Sides {
-    /// All of them.
-    Both,
-    /// Fronts.
-    CounterClockwise,
-    /// Fronts of what is mirrored.
-    Clockwise,
+/// Which triangles are fronts, by the order of their corners as they are seen, and which are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sides {
+    /// Fronts are clockwise, as those of a mesh in a mirror; else counter-clockwise.
+    pub clockwise: bool,
+    /// Backs are left out.
+    pub fronts_only: bool,
 }
 
 /// Draws inside of [`Recorder::render`].
@@ -409,7 +407,7 @@ impl RenderPass<'_> {
         self.bound = Some(pipeline.inner().layout);
     }
 
-    /// Draws `vertices` vertices, and the triangles that show `sides`; nothing if no pipeline is bound.
+    /// Draws `vertices` vertices, of which the triangles on `sides` show; nothing if no pipeline is bound.
     pub fn draw<P: NoUninit>(&mut self, push: &P, vertices: u32, sides: Sides) {
         let Some(layout) = self.bound else { return };
         let device = &self.commands.gpu.device;
@@ -419,13 +417,10 @@ impl RenderPass<'_> {
             if !bytes.is_empty() {
                 device.cmd_push_constants(self.commands.buffer, layout, vk::ShaderStageFlags::ALL, 0, bytes);
             }
-            let (cull, front) = match sides {
-                Sides::Both => (vk::CullModeFlags::NONE, vk::FrontFace::COUNTER_CLOCKWISE),
-                Sides::CounterClockwise => (vk::CullModeFlags::BACK, vk::FrontFace::COUNTER_CLOCKWISE),
-                Sides::Clockwise => (vk::CullModeFlags::BACK, vk::FrontFace::CLOCKWISE),
-            };
-            device.cmd_set_cull_mode(self.commands.buffer, cull);
+            let front = if sides.clockwise { vk::FrontFace::CLOCKWISE } else { vk::FrontFace::COUNTER_CLOCKWISE };
+            let cull = if sides.fronts_only { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
             device.cmd_set_front_face(self.commands.buffer, front);
+            device.cmd_set_cull_mode(self.commands.buffer, cull);
             device.cmd_draw(self.commands.buffer, vertices, 1, 0, 0);
         }
     }

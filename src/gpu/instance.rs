@@ -86,6 +86,8 @@ pub struct DeviceInfo {
     pub kind: DeviceKind,
     /// Its largest heap in bytes.
     pub memory: u64,
+    /// The rasteriser snaps vertices to 2^-this of a pixel.
+    pub sub_pixel_bits: u32,
     /// `VK_KHR_acceleration_structure` and `VK_KHR_ray_query` are there.
     pub ray_query: bool,
     /// What Vitrum needs and it lacks; empty: it can be used.
@@ -261,6 +263,7 @@ impl Instance {
                 _ => DeviceKind::Other,
             },
             memory: memory.memory_heaps_as_slice().iter().map(|heap| heap.size).max().unwrap_or(0),
+            sub_pixel_bits: properties.limits.sub_pixel_precision_bits,
             ray_query: has(ash::khr::acceleration_structure::NAME) && has(ash::khr::ray_query::NAME),
             missing,
         })

@@ -70,7 +70,7 @@ impl Display {
                 cmd.use_image(&targets.total, Use::Sampled);
                 cmd.render(&[Target { image: &screen, clear: Some([0.0; 4]) }], None, |pass| {
                     pass.bind(&self.pipeline, &targets.display);
-                    pass.draw(&push, 3, Sides::Both);
+                    pass.draw(&push, 3, Sides::default());
                 });
             });
         })?;

@@ -33,7 +33,7 @@ impl EnvironmentPass {
         let depth = Target { image: &targets.depth, clear: None };
         cmd.render(&[color], Some(depth), |pass| {
             pass.bind(&self.pipeline, &resources.group);
-            pass.draw(&push, 3, Sides::Both);
+            pass.draw(&push, 3, Sides::default());
         });
     }
 }

@@ -115,14 +115,12 @@ impl Geometry {
                 smooth_normals: u32::from(object.smooth && !mesh.normals.is_empty()),
                 number: object.number as u32 + 1,
             });
-            let mirrored = object_to_world.matrix3.determinant() < 0.0;
             all.draws.push(Draw {
                 vertices: 3 * mesh.triangles.len() as u32,
-                // What is nearest of such a body is a front: leaving out the backs changes nothing but the time.
-                sides: match (scene.is_seen_from_outside(object), mirrored) {
-                    (false, _) => Sides::Both,
-                    (true, false) => Sides::CounterClockwise,
-                    (true, true) => Sides::Clockwise,
+                sides: Sides {
+                    clockwise: object_to_world.matrix3.determinant() < 0.0,
+                    // What is nearest of such a body is a front: leaving out the backs changes nothing but the time.
+                    fronts_only: scene.is_seen_from_outside(object),
                 },
             });
         }
