@@ -250,3 +250,74 @@ impl fmt::Display for Selection {
         Ok(())
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::Overrides;
+
+    fn built_in() -> Scene {
+        Scene::load(None, &Overrides::default()).expect("the built-in scene")
+    }
+
+    fn selected(text: &str) -> Vec<&'static str> {
+        text.parse::<Selection>().expect("a selection").resolve(&built_in()).names()
+    }
+
+    #[test]
+    fn the_table_is_in_the_order_of_the_effects() {
+        assert!(TABLE.iter().enumerate().all(|(i, row)| row.effect as usize == i));
+    }
+
+    #[test]
+    fn shaders_number_and_name_effects_as_the_table_does() {
+        let text = include_str!("../shaders/effects.glsl");
+        let mut found = 0;
+        for line in text.lines().filter(|line| line.starts_with("layout(constant_id")) {
+            let id: usize = line.split(['=', ')']).nth(1).and_then(|id| id.trim().parse().ok()).expect("an id");
+            let name = line.split_whitespace().nth(5).expect("a name");
+            assert_eq!(name, TABLE[id].name.to_uppercase().replace('-', "_"), "{line}");
+            found += 1;
+        }
+        assert_eq!(found, TABLE.iter().filter(|row| !row.models.is_empty()).count());
+    }
+
+    #[test]
+    fn selections_add_and_take_away() {
+        let auto = ["reflection", "transmission", "interior", "nesting"];
+        assert_eq!(selected("auto"), auto);
+        assert_eq!(selected("all").len(), TABLE.len());
+        assert_eq!(selected("reflection, shadows"), ["reflection", "shadows"]);
+        assert_eq!(selected("auto,-nesting"), auto[..3]);
+        assert_eq!(selected("-nesting"), auto[..3]);
+        assert_eq!(selected("all,-opaque,opaque").len(), TABLE.len());
+        assert!("auto,magic".parse::<Selection>().is_err());
+        assert_eq!("all,-nesting".parse::<Selection>().map(|s| s.to_string()), Ok("all,-nesting".into()));
+    }
+
+    #[test]
+    fn effects_are_called_for_by_what_objects_wear() {
+        let mut scene = built_in();
+        let calls = |scene: &Scene| Selection::default().resolve(scene).names();
+        scene.objects.truncate(1);
+        assert_eq!(calls(&scene), ["reflection", "transmission", "interior"]);
+        let glass = |change: fn(&mut Dielectric)| {
+            let mut glass = Dielectric::default();
+            change(&mut glass);
+            Surface::Dielectric(glass)
+        };
+        for (surface, expected) in [
+            (glass(|g| g.roughness = 0.02), "roughness"),
+            (glass(|g| g.roughness = 0.02), "energy-compensation"),
+            (glass(|g| (g.attenuation_distance, g.attenuation_color.x) = (1.0, 0.5)), "absorption"),
+            (glass(|g| g.dispersion = 0.1), "dispersion"),
+            (glass(|g| g.thin_walled = true), "thin-walled"),
+            (Surface::Opaque(crate::scene::Opaque::default()), "opaque"),
+        ] {
+            scene.materials[0].surface = surface;
+            assert!(calls(&scene).contains(&expected), "{expected}");
+        }
+        scene.objects.clear();
+        assert!(calls(&scene).is_empty());
+    }
+}

@@ -1,5 +1,7 @@
 //! What one render does: scene and options, with every default filled in and every conflict refused.
 
+use std::time::Duration;
+
 use crate::effects::{Effect, Effects, Selection};
 use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap};
 use crate::scene::Scene;
@@ -44,6 +46,24 @@ pub enum Budget {
         /// The most samples.
         most: u32,
     },
+}
+
+impl Budget {
+    /// What is left of it after some time.
+    #[must_use]
+    pub fn less(self, spent: Duration) -> Self {
+        match self {
+            Self::Samples(_) => self,
+            Self::Seconds { seconds, most } => Self::Seconds { seconds: seconds - spent.as_secs_f64(), most },
+        }
+    }
+
+    /// The most samples that it allows.
+    pub fn most(self) -> u32 {
+        match self {
+            Self::Samples(most) | Self::Seconds { most, .. } => most,
+        }
+    }
 }
 
 /// Samples that a time budget ends with at the latest.

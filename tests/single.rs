@@ -214,7 +214,7 @@ fn six_sides() -> Scene {
     let mut scene = built_in(1.5);
     scene.objects.clear();
     let (width, height) = (64_u32, 32_u32);
-    let texel = |x: u32, y: u32| match (y * 4 / height, (x * 8 / width + 1) / 2 % 4) {
+    let texel = |x: u32, y: u32| match (y * 4 / height, (x * 8 / width).div_ceil(2) % 4) {
         (0, _) => [0.0, 1.0, 1.0],
         (3, _) => [1.0, 0.0, 1.0],
         (_, 0) => [1.0, 0.0, 0.0],
@@ -382,7 +382,7 @@ fn more_samples_converge_to_the_same_picture_whatever_the_seed() {
 fn leaving_out_the_backs_of_closed_bodies_changes_nothing() {
     let mut scene = built_in(1.5);
     // Mirrored bodies have their fronts the other way round.
-    scene.objects[0].transform = scene.objects[0].transform * glam::DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
+    scene.objects[0].transform *= glam::DAffine3::from_scale(DVec3::new(-1.0, 1.0, 1.0));
     let Some((_, fronts)) = picture(&scene, sized(512, 384)) else { return };
     for mesh in &mut scene.meshes {
         mesh.faults.open_edges = 1;

@@ -28,7 +28,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     /// Renders one image, off screen
-    Render(render::RenderCommand),
+    Render(Box<render::RenderCommand>),
     /// Lists the Vulkan devices and what each can do
     Devices(devices::DevicesCommand),
 }
@@ -48,14 +48,14 @@ impl Talk {
     /// Something that the user should know, on stderr.
     fn note(self, text: &str) {
         if !self.quiet {
-            eprintln!("{text}");
+            say(text);
         }
     }
 
     /// Something for those who asked for more.
     fn detail(self, text: &str) {
         if self.verbose > 0 {
-            eprintln!("{text}");
+            say(text);
         }
     }
 
@@ -102,14 +102,23 @@ fn one_line(error: &clap::Error) -> String {
     format!("{}; see --help", told.join("; "))
 }
 
+/// The error and its causes, a line each; a cause that only repeats what is above it is left out.
 fn report(error: &Error) {
-    let mut text = format!("error: {error}\n");
+    let mut lines = vec![format!("error: {error}")];
     let mut source = error.source();
     while let Some(cause) = source {
-        text += &format!("Caused by: {cause}\n");
+        let line = format!("Caused by: {cause}");
+        if lines.last() != Some(&line) {
+            lines.push(line);
+        }
         source = cause.source();
     }
-    let _ = std::io::stderr().write_all(text.as_bytes());
+    say(&lines.join("\n"));
+}
+
+/// A line on stderr. Where that is closed or full, there is nobody left to tell.
+fn say(text: &str) {
+    let _ = std::io::stderr().write_all(format!("{text}\n").as_bytes());
 }
 
 /// Prints a result; a reader that went away, as `head` does, is no failure.

@@ -61,7 +61,7 @@ impl RenderCommand {
         let load = start.elapsed();
         let idle = idle_options(&self.options, format);
         let args = self.options.or(scene.render.clone());
-        let plan = Plan::new(&scene, &args)?;
+        let mut plan = Plan::new(&scene, &args)?;
         if format == ImageFormat::Png && !plan.aovs.is_empty() {
             return Err(Error::Usage("--aov adds layers to an EXR; name the output .exr".into()));
         }
@@ -81,6 +81,7 @@ impl RenderCommand {
         let device = gpu.info().clone();
         talk.detail(&format!("device: {} ({})", device.name, device.driver));
         let bar = progress_bar(&plan, talk);
+        plan.budget = plan.budget.less(start.elapsed());
         let rendered = passes::render(&gpu, &scene, &plan, &mut |done, _| bar.set_position(done.into()))?;
         bar.finish_and_clear();
 

@@ -231,20 +231,6 @@ impl Instance {
         let work = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         let queue_family = families.iter().position(|family| family.queue_flags.contains(work));
 
-        let mut missing = Vec::new();
-        if properties.api_version < vk::API_VERSION_1_3 {
-            missing.push(format!("Vulkan 1.3 (it has {})", version_text(properties.api_version)));
-        }
-        for (there, name) in [
-            (vulkan13.dynamic_rendering == vk::TRUE, "the feature dynamicRendering"),
-            (vulkan13.synchronization2 == vk::TRUE, "the feature synchronization2"),
-            (vulkan13.maintenance4 == vk::TRUE, "the feature maintenance4"),
-            (queue_family.is_some(), "a queue for graphics and compute"),
-        ] {
-            if !there {
-                missing.push(name.into());
-            }
-        }
         let text = |text: Result<&CStr, _>| text.map_or(String::new(), |text| text.to_string_lossy().into_owned());
         Ok(DeviceInfo {
             handle,
@@ -265,9 +251,28 @@ impl Instance {
             memory: memory.memory_heaps_as_slice().iter().map(|heap| heap.size).max().unwrap_or(0),
             sub_pixel_bits: properties.limits.sub_pixel_precision_bits,
             ray_query: has(ash::khr::acceleration_structure::NAME) && has(ash::khr::ray_query::NAME),
-            missing,
+            missing: missing(properties.api_version, &vulkan13, queue_family.is_some()),
         })
     }
+}
+
+/// What Vitrum needs of a device, and this one lacks.
+fn missing(api: u32, features: &vk::PhysicalDeviceVulkan13Features<'_>, queue: bool) -> Vec<String> {
+    let mut missing = Vec::new();
+    if api < vk::API_VERSION_1_3 {
+        missing.push(format!("Vulkan 1.3 (it has {})", version_text(api)));
+    }
+    for (there, name) in [
+        (features.dynamic_rendering == vk::TRUE, "the feature dynamicRendering"),
+        (features.synchronization2 == vk::TRUE, "the feature synchronization2"),
+        (features.maintenance4 == vk::TRUE, "the feature maintenance4"),
+        (queue, "a queue for graphics and compute"),
+    ] {
+        if !there {
+            missing.push(name.into());
+        }
+    }
+    missing
 }
 
 impl Drop for Instance {
@@ -309,4 +314,22 @@ unsafe extern "system" fn record(
 fn version_text(version: u32) -> String {
     let part = (vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version));
     format!("{}.{}.{}", part.0, part.1, part.2)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_an_old_device_lacks_is_named() {
+        let all = vk::PhysicalDeviceVulkan13Features::default()
+            .dynamic_rendering(true)
+            .synchronization2(true)
+            .maintenance4(true);
+        assert!(missing(vk::API_VERSION_1_3, &all, true).is_empty());
+        assert_eq!(missing(vk::make_api_version(0, 1, 2, 131), &all, true), ["Vulkan 1.3 (it has 1.2.131)"]);
+        let none = vk::PhysicalDeviceVulkan13Features::default();
+        assert_eq!(missing(vk::API_VERSION_1_3, &none, false).len(), 4);
+        assert!(missing(vk::API_VERSION_1_3, &none, true)[0].contains("dynamicRendering"));
+    }
 }

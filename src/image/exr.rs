@@ -3,6 +3,8 @@
 
 use std::io::Cursor;
 
+use exr::block::chunk::CompressedBlock;
+use exr::meta::BlockDescription;
 use exr::meta::header::Header;
 use exr::prelude::*;
 
@@ -72,6 +74,9 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<FloatImage, Unreadable> {
         let display = header.shared_attributes.display_window.size;
         check_size(display.width(), display.height(), 1, bytes.len())?;
     }
+    if headers.iter().any(|header| is_dwa(header.compression)) {
+        check_dwa_chunks(bytes)?;
+    }
     let [red, green, blue] = headers.iter().find_map(color_channels).ok_or_else(|| {
         let found: Vec<_> =
             headers.iter().flat_map(|h| &h.channels.list).map(|channel| channel.name.to_string()).collect();
@@ -112,6 +117,44 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<FloatImage, Unreadable> {
     Ok(place(layer.size, layer.channel_data.pixels.1, layer.attributes.layer_position))
 }
 
+fn is_dwa(compression: Compression) -> bool {
+    matches!(compression, Compression::DWAA(_) | Compression::DWAB(_))
+}
+
+/// Refuses DWA chunks that claim to become larger than their pixels: the `exr` crate allocates what they claim.
+fn check_dwa_chunks(bytes: &[u8]) -> std::result::Result<(), Unreadable> {
+    let wrong = |error: exr::error::Error| Unreadable(error.to_string());
+    let reader = exr::block::read(Cursor::new(bytes), /* pedantic */ false).map_err(wrong)?;
+    let headers: Vec<Header> = reader.headers().to_vec();
+    for chunk in reader.filter_chunks(/* pedantic */ false, |_, _, _| true).map_err(wrong)? {
+        let chunk = chunk.map_err(wrong)?;
+        let Some(header) = headers.get(chunk.layer_index).filter(|header| is_dwa(header.compression)) else { continue };
+        let data = match &chunk.compressed_block {
+            CompressedBlock::ScanLine(block) => &block.compressed_pixels_le,
+            CompressedBlock::Tile(block) => &block.compressed_pixels_le,
+            _ => continue,
+        };
+        let (columns, rows) = match header.blocks {
+            BlockDescription::ScanLines => (header.layer_size.width(), header.compression.scan_lines_per_block()),
+            BlockDescription::Tiles(tiles) => (tiles.tile_size.width(), tiles.tile_size.height()),
+        };
+        // 8x8 blocks reach over the edges; twice four bytes a sample, as each section has overhead of its own.
+        let side = |pixels: usize, whole: usize| pixels.min(whole) + 8;
+        let area = side(columns, header.layer_size.width()) * side(rows, header.layer_size.height());
+        let largest = (area * header.channels.list.len() * 8) as u64;
+        // A version, then counters: bytes unknown, unknown compressed, AC, DC, RLE compressed, RLE, RLE raw, and
+        // counts of AC and DC coefficients of two bytes.
+        let counter = |index: usize| {
+            data.get(index * 8..index * 8 + 8).and_then(|bytes| bytes.try_into().ok()).map(u64::from_le_bytes)
+        };
+        let sizes = [counter(1), counter(6), counter(7), counter(8), counter(9)];
+        if sizes.into_iter().flatten().any(|size| size > largest) {
+            return Err(Unreadable("a DWA chunk claims more data than it has pixels; the file is damaged".into()));
+        }
+    }
+    Ok(())
+}
+
 /// The names of red, green and blue, of the unnamed layer before others; three times that of the luminance.
 fn color_channels(header: &Header) -> Option<[Text; 3]> {
     let names: Vec<String> = header.channels.list.iter().map(|channel| channel.name.to_string()).collect();
@@ -142,4 +185,125 @@ fn in_window(size: Vec2<usize>, pixels: Vec<[f32; 3]>, position: Vec2<i32>, wind
         }
     }
     FloatImage { width, height, pixels: placed, layers: Vec::new() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Layer;
+    use super::*;
+
+    fn image() -> FloatImage {
+        let pixels =
+            vec![[0.0, 1.0, 2.0], [0.5, -1.0, 65504.0], [1e30, 1e-30, 3.0], [7.0, 8.0, 9.0], [0.1, 0.2, 0.3], [4.0; 3]];
+        let normal = ["X", "Y", "Z"].map(|name| (name.to_owned(), vec![0.25; 6])).to_vec();
+        let layers = vec![
+            Layer { name: "normal".into(), channels: normal },
+            Layer { name: "depth".into(), channels: vec![("Z".into(), vec![1.5; 6])] },
+        ];
+        FloatImage { width: 3, height: 2, pixels, layers }
+    }
+
+    fn metadata() -> Vec<(String, String)> {
+        ["version", "device", "options", "seed", "scene", "model"]
+            .map(|key| (format!("vitrum:{key}"), format!("the {key}, \u{e4}")))
+            .to_vec()
+    }
+
+    #[test]
+    fn radiance_comes_back_bit_for_bit() {
+        let decoded = decode(&encode(&image(), &metadata()).unwrap()).unwrap();
+        assert_eq!((decoded.width, decoded.height), (3, 2));
+        assert_eq!(decoded.pixels, image().pixels);
+    }
+
+    #[test]
+    fn layers_and_metadata_are_in_the_header() {
+        let bytes = encode(&image(), &metadata()).unwrap();
+        let meta = MetaData::read_from_buffered(Cursor::new(&bytes), true).unwrap();
+        let names: Vec<_> = meta.headers[0].channels.list.iter().map(|channel| channel.name.to_string()).collect();
+        assert_eq!(names, ["B", "G", "R", "depth.Z", "normal.X", "normal.Y", "normal.Z"]);
+        let key = Text::from("vitrum:device");
+        let AttributeValue::Text(device) = &meta.headers[0].own_attributes.other[&key] else { panic!("no text") };
+        // Text is stored as Latin 1.
+        assert_eq!(device.to_string(), "the device, \u{e4}");
+    }
+
+    #[test]
+    fn the_same_image_gives_the_same_bytes() {
+        let first = encode(&image(), &metadata()).unwrap();
+        for _ in 0..16 {
+            assert_eq!(encode(&image(), &metadata()).unwrap(), first);
+        }
+    }
+
+    #[test]
+    fn every_layout_of_colour_is_read() {
+        for compression in
+            [Compression::Uncompressed, Compression::RLE, Compression::ZIP1, Compression::PIZ, Compression::PXR24]
+        {
+            for layout in [["R", "G", "B"], ["beauty.R", "beauty.G", "beauty.B"], ["Y", "A", "Z"]] {
+                let channel = |(index, name): (usize, &str)| {
+                    let samples = match index {
+                        0 => FlatSamples::F16(vec![f16::from_f32(0.5); 4]),
+                        1 => FlatSamples::F32(vec![2.0; 4]),
+                        _ => FlatSamples::U32(vec![3; 4]),
+                    };
+                    AnyChannel::new(name, samples)
+                };
+                let channels = AnyChannels::sort(layout.into_iter().enumerate().map(channel).collect());
+                let encoding =
+                    Encoding { compression, blocks: Blocks::Tiles(Vec2(2, 2)), line_order: LineOrder::Increasing };
+                let layer = exr::image::Layer::new((2, 2), LayerAttributes::default(), encoding, channels);
+                let mut bytes = Cursor::new(Vec::new());
+                exr::image::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+                let expected = if layout[0] == "Y" { [0.5; 3] } else { [0.5, 2.0, 3.0] };
+                assert_eq!(decode(bytes.get_ref()).unwrap().pixels, [expected; 4], "{layout:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn the_display_window_is_what_is_seen() {
+        let channel = |name| AnyChannel::new(name, FlatSamples::F32(vec![1.0, 2.0, 3.0, 4.0]));
+        let channels = AnyChannels::sort(["R", "G", "B"].into_iter().map(channel).collect());
+        let attributes = LayerAttributes { layer_position: Vec2(9, 21), ..LayerAttributes::default() };
+        let layer = exr::image::Layer::new((2, 2), attributes, Encoding::UNCOMPRESSED, channels);
+        let mut image = exr::image::Image::from_layer(layer);
+        image.attributes.display_window = IntegerBounds::new((10, 20), (2, 3));
+        let mut bytes = Cursor::new(Vec::new());
+        image.write().to_buffered(&mut bytes).unwrap();
+        let decoded = decode(bytes.get_ref()).unwrap();
+        assert_eq!((decoded.width, decoded.height), (2, 3));
+        assert_eq!(decoded.pixels.iter().map(|pixel| pixel[0]).collect::<Vec<_>>(), [0.0, 0.0, 2.0, 0.0, 4.0, 0.0]);
+    }
+
+    #[test]
+    fn channels_without_colour_are_listed() {
+        let channels = AnyChannels::sort(
+            ["A", "X", "Z"].map(|name| AnyChannel::new(name, FlatSamples::F32(vec![1.0]))).into_iter().collect(),
+        );
+        let layer = exr::image::Layer::new((1, 1), LayerAttributes::default(), Encoding::UNCOMPRESSED, channels);
+        let mut bytes = Cursor::new(Vec::new());
+        exr::image::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+        assert_eq!(decode(bytes.get_ref()).unwrap_err().0, "holds neither R, G and B nor Y but the channels A, X, Z");
+    }
+
+    #[test]
+    fn a_header_that_lies_about_the_size_is_refused() {
+        let mut bytes =
+            encode(&FloatImage { width: 1, height: 1, pixels: vec![[1.0; 3]], layers: vec![] }, &[]).unwrap();
+        let name = b"dataWindow\0box2i\0";
+        let at = bytes.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 4;
+        for (width, height, expected) in [
+            (20000_i32, 1_i32, "20000x1 pixels; sides up to 16384 are read"),
+            (16000, 16000, ""),
+            (i32::MAX, i32::MAX, ""),
+            (0, 1, ""),
+        ] {
+            bytes[at + 8..at + 12].copy_from_slice(&(width - 1).to_le_bytes());
+            bytes[at + 12..at + 16].copy_from_slice(&(height - 1).to_le_bytes());
+            let Unreadable(message) = decode(&bytes).unwrap_err();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
 }

@@ -128,3 +128,128 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
     }
     Err(io::Error::other("too many symbolic links"))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let mut names: Vec<_> =
+            fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn the_extension_decides_the_format() {
+        assert_eq!(ImageFormat::of(Path::new("a/b.EXR")).unwrap(), ImageFormat::Exr);
+        assert_eq!(ImageFormat::of(Path::new("b.png")).unwrap(), ImageFormat::Png);
+        for name in ["b.jpg", "b", "png", ".png"] {
+            let error = ImageFormat::of(Path::new(name)).unwrap_err();
+            assert_eq!(error.to_string(), format!("{name}: unknown image format; name the output .exr or .png"));
+            assert_eq!(error.exit_code(), 2);
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_written_is_refused_early() {
+        let folder = tempfile::tempdir().unwrap();
+        let refusal = |path: &Path| {
+            let error = OutputFile::new(path).unwrap_err();
+            assert_eq!(error.exit_code(), 2);
+            error.to_string()
+        };
+        assert!(refusal(&folder.path().join("no/a.png")).contains("/no\" does not exist; create it first"));
+        assert!(refusal(folder.path()).contains("is a folder"));
+        assert!(refusal(Path::new("..")).contains("names no file"));
+        fs::write(folder.path().join("file"), "").unwrap();
+        assert!(OutputFile::new(&folder.path().join("file/a.png")).is_err());
+        assert_eq!(names(folder.path()), ["file"]);
+    }
+
+    #[test]
+    fn a_file_is_replaced_whole() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.png");
+        let output = OutputFile::new(&path).unwrap();
+        assert!(names(folder.path()).is_empty());
+        output.write(b"first").unwrap();
+        output.write(b"second").unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"second");
+        assert_eq!(names(folder.path()), ["a.png"]);
+    }
+
+    #[test]
+    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        let output = OutputFile::new(&path).unwrap();
+        output.write(b"old").unwrap();
+        let error = output.write_with(|file| {
+            file.write_all(b"half of the ne")?;
+            Err(io::ErrorKind::StorageFull.into())
+        });
+        let error = error.unwrap_err();
+        assert_eq!(error.exit_code(), 2);
+        assert!(error.to_string().ends_with("a.exr: cannot write"), "{error}");
+        assert_eq!(fs::read(&path).unwrap(), b"old");
+        assert_eq!(names(folder.path()), ["a.exr"]);
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn links_stay_and_devices_are_refused() {
+        use std::os::unix::fs::symlink;
+        let folder = tempfile::tempdir().unwrap();
+        let in_folder = |name: &str| folder.path().join(name);
+        fs::create_dir(in_folder("real")).unwrap();
+        symlink("real/a.png", in_folder("link.png")).unwrap();
+        symlink("link.png", in_folder("chain.png")).unwrap();
+        // Dangling at first, then not.
+        for content in ["one", "two"] {
+            OutputFile::new(&in_folder("chain.png")).unwrap().write(content.as_bytes()).unwrap();
+            assert_eq!(fs::read_to_string(in_folder("real/a.png")).unwrap(), content);
+        }
+        assert!(fs::read_link(in_folder("link.png")).is_ok() && fs::read_link(in_folder("chain.png")).is_ok());
+        assert_eq!(names(&in_folder("real")), ["a.png"]);
+        symlink("loop.png", in_folder("loop.png")).unwrap();
+        assert!(OutputFile::new(&in_folder("loop.png")).is_err());
+        let error = OutputFile::new(Path::new("/dev/null")).unwrap_err();
+        assert!(error.to_string().contains("device, pipe or socket"), "{error}");
+        assert!(fs::metadata("/dev/null").is_ok_and(|metadata| !metadata.is_file()));
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn permissions_are_those_of_the_umask_or_of_the_old_file() {
+        use std::os::unix::fs::PermissionsExt;
+        let folder = tempfile::tempdir().unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode() & 0o777;
+        let plain = folder.path().join("plain");
+        fs::write(&plain, "").unwrap();
+        let path = folder.path().join("a.png");
+        let output = OutputFile::new(&path).unwrap();
+        output.write(b"").unwrap();
+        assert_eq!(mode(&path), mode(&plain));
+        fs::set_permissions(&path, fs::Permissions::from_mode(0o640)).unwrap();
+        output.write(b"").unwrap();
+        assert_eq!(mode(&path), 0o640);
+    }
+
+    /// The real thing, where it can be had: a file system that is full.
+    #[cfg(target_os = "linux")]
+    #[test]
+    fn a_full_disk_leaves_the_old_file() {
+        let full = |file: &mut File| -> io::Result<()> {
+            file.write_all(b"new")?;
+            File::options().write(true).open("/dev/full")?.write_all(b"rest")
+        };
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.exr");
+        fs::write(&path, "old").unwrap();
+        let error = OutputFile::new(&path).unwrap().write_with(full).unwrap_err();
+        let cause = std::error::Error::source(&error).unwrap().to_string();
+        assert!(cause.contains("No space left"), "{cause}");
+        assert_eq!((fs::read_to_string(&path).unwrap().as_str(), names(folder.path()).len()), ("old", 1));
+    }
+}

@@ -25,3 +25,26 @@ pub fn encode<const CHANNELS: usize>(
     writer.finish()?;
     Ok(bytes)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pixels_srgb_mark_and_texts_come_back() {
+        let metadata = [("vitrum:version".to_owned(), "0.1 \u{3b1}".to_owned()), ("k".repeat(99), "cut".to_owned())];
+        let pixels = [[1, 2, 3, 255], [4, 5, 6, 0]];
+        let bytes = encode(2, 1, &pixels, &metadata).unwrap();
+        let mut reader = png::Decoder::new(std::io::Cursor::new(&bytes)).read_info().unwrap();
+        let mut decoded = vec![0; 8];
+        reader.next_frame(&mut decoded).unwrap();
+        assert_eq!(decoded, pixels.as_flattened());
+        let info = reader.info();
+        assert_eq!(info.srgb, Some(png::SrgbRenderingIntent::Perceptual));
+        assert_eq!(info.utf8_text[0].keyword, "vitrum:version");
+        assert_eq!(info.utf8_text[0].get_text().unwrap(), "0.1 \u{3b1}");
+        assert_eq!(info.utf8_text[1].keyword, "k".repeat(79));
+        assert_eq!(encode(2, 1, &pixels, &metadata).unwrap(), bytes);
+        assert!(encode(1, 1, &[[1, 2, 3]], &[]).is_ok());
+    }
+}

@@ -15,11 +15,15 @@ pub const LARGEST_SIDE: usize = 16384;
 /// What can be read, for messages.
 pub const KNOWN_FORMATS: &str = ".exr, .hdr, .png, .jpg, .jpeg";
 
-/// How many bytes of pixels a byte of a file can stand for at most: DEFLATE reaches 1032, JPEG and EXR's codecs more
-/// on uniform images. A header that claims more is a lie, and its pixels are not allocated.
-const LARGEST_RATIO: usize = 1 << 14;
+/// How many bytes of pixels a byte of a file can stand for at most: DEFLATE reaches 1032, JPEG and EXR's codecs a few
+/// times that on uniform images. A header that claims more is a lie, and its pixels are not allocated.
+const LARGEST_RATIO: usize = 1 << 12;
+
+/// Pixels of this many bytes are allocated without looking at the size of the file.
+const ALWAYS_FINE: usize = 64 << 20;
 
 /// Why an image cannot be read.
+#[derive(Debug)]
 pub struct Unreadable(pub String);
 
 /// The pixels of the file at `path`, whose content is `bytes`: linear, sRGB files decoded. The content decides what it
@@ -46,7 +50,9 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<FloatImage> {
             Some(Kind::Other(_)) => " as JPEG",
             None => return Error::input(path, 0, why),
         };
-        Error::input(path, 0, format!("cannot be read{kind}: {why}"))
+        // Decoders may spread their reasons over several lines.
+        let why: Vec<_> = why.split_whitespace().collect();
+        Error::input(path, 0, format!("cannot be read{kind}: {}", why.join(" ")))
     })
 }
 
@@ -74,7 +80,7 @@ pub fn check_size(width: usize, height: usize, bytes_per_pixel: usize, file: usi
     if width > LARGEST_SIDE || height > LARGEST_SIDE {
         return Err(Unreadable(format!("{width}x{height} pixels; sides up to {LARGEST_SIDE} are read, scale it down")));
     }
-    if width * height * bytes_per_pixel > file.saturating_mul(LARGEST_RATIO) {
+    if width * height * bytes_per_pixel > file.saturating_mul(LARGEST_RATIO).max(ALWAYS_FINE) {
         return Err(Unreadable(format!("{width}x{height} pixels cannot be in {file} bytes; the file is damaged")));
     }
     Ok(())
@@ -109,4 +115,69 @@ fn decode_other(format: Format, bytes: &[u8]) -> Result<FloatImage, Unreadable> 
 /// IEC 61966-2-1, display value to linear.
 fn from_srgb(value: f64) -> f32 {
     (if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }) as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use image::{DynamicImage, ImageBuffer, Luma, Rgb};
+
+    use super::*;
+
+    fn encoded(image: &DynamicImage, format: Format) -> Vec<u8> {
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, format).unwrap();
+        bytes.into_inner()
+    }
+
+    fn first_pixel(image: impl Into<DynamicImage>, format: Format) -> [f32; 3] {
+        let bytes = encoded(&image.into(), format);
+        // The content decides, not the name.
+        decode(Path::new("sky.hdr"), &bytes).unwrap().pixels[0]
+    }
+
+    fn close(found: [f32; 3], expected: [f32; 3], tolerance: f32) {
+        assert!(found.iter().zip(expected).all(|(a, b)| (a - b).abs() <= tolerance), "{found:?}, not {expected:?}");
+    }
+
+    #[test]
+    fn srgb_is_decoded_to_linear() {
+        let eight = ImageBuffer::from_pixel(2, 2, Rgb([0_u8, 188, 255]));
+        close(first_pixel(eight.clone(), Format::Png), [0.0, 0.502_886_5, 1.0], 1e-6);
+        close(first_pixel(ImageBuffer::from_pixel(8, 8, Rgb([188_u8; 3])), Format::Jpeg), [0.503; 3], 0.01);
+        let sixteen = ImageBuffer::from_pixel(2, 2, Rgb([0_u16, 32768, 655]));
+        close(first_pixel(sixteen, Format::Png), [0.0, 0.214_048_2, 0.000_773_58], 1e-6);
+        close(first_pixel(ImageBuffer::from_pixel(2, 2, Luma([188_u8])), Format::Png), [0.502_886_5; 3], 1e-6);
+        close(first_pixel(ImageBuffer::from_pixel(2, 2, Luma([32768_u16])), Format::Png), [0.214_048_2; 3], 1e-6);
+    }
+
+    #[test]
+    fn radiance_files_are_linear() {
+        let pixels = ImageBuffer::from_pixel(9, 2, Rgb([0.5_f32, 100.0, 0.25]));
+        close(first_pixel(pixels, Format::Hdr), [0.5, 100.0, 0.25], 0.5);
+    }
+
+    #[test]
+    fn what_is_no_image_says_what_would_be_one() {
+        let error = |name: &str, bytes: &[u8]| decode(Path::new(name), bytes).unwrap_err().to_string();
+        assert_eq!(
+            error("a.txt", b"hello"),
+            "a.txt: is no image of a known kind; known: .exr, .hdr, .png, .jpg, .jpeg"
+        );
+        assert!(error("a.EXR", b"hello").starts_with("a.EXR: cannot be read as OpenEXR: "));
+        assert!(error("a.jpeg", b"").starts_with("a.jpeg: cannot be read as JPEG: "));
+        assert!(error("a.png", b"GIF89a").starts_with("a.png: cannot be read as PNG: "));
+        assert!(error("a.hdr", b"#?RADIANCE\n\n-Y x").starts_with("a.hdr: cannot be read as Radiance HDR: "));
+    }
+
+    #[test]
+    fn sizes_are_refused_before_pixels_are_allocated() {
+        let error = |bytes: &[u8]| decode(Path::new("a"), bytes).unwrap_err().to_string();
+        let hdr = |size: &str| format!("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{size}\n").into_bytes();
+        assert!(error(&hdr("-Y 100000 +X 100000")).contains("100000x100000 pixels; sides up to 16384 are read"));
+        assert!(error(&hdr("-Y 16000 +X 16000")).contains("cannot be in"));
+        assert!(error(&hdr("-Y 0 +X 8")).contains("both sides must be at least 1"));
+        let mut png = encoded(&ImageBuffer::from_pixel(1, 1, Luma([0_u8])).into(), Format::Png);
+        png[16..24].copy_from_slice(&[0, 1, 0, 0, 0, 1, 0, 0]);
+        assert!(error(&png).contains("cannot be read as PNG"));
+    }
 }

@@ -76,7 +76,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
         let push = view::sample_push(plan.size, offset);
         times.add(commands.run(|cmd| passes.sample(cmd, &resources, &targets, push, samples))?);
         samples += 1;
-        progress(samples, most(plan.budget));
+        progress(samples, plan.budget.most());
         if is_spent(plan.budget, start.elapsed(), samples) {
             break;
         }
@@ -161,12 +161,6 @@ impl Times {
                 None => self.0.push(time),
             }
         }
-    }
-}
-
-fn most(budget: Budget) -> u32 {
-    match budget {
-        Budget::Samples(samples) | Budget::Seconds { most: samples, .. } => samples,
     }
 }
 

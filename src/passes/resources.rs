@@ -6,7 +6,6 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use half::f16;
 
 use super::view::View;
-use crate::effects::Effect;
 use crate::gpu::{
     Bind, BindGroup, Buffer, Commands, Format, Frame, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord,
     Result, Sides, Specialization, Use,
@@ -184,7 +183,6 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         Surroundings::Image(_) => DVec3::splat(environment.intensity),
         Surroundings::Color(color) => color * environment.intensity,
     };
-    debug_assert_eq!(plan.effects.contains(Effect::DirectLight) && light_count == 0, false);
     Frame {
         view_projection: Frame::columns(view.view_projection),
         ray_corner: view.ray_corner.as_vec3(),

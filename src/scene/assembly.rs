@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DAffine3;
 
@@ -53,19 +54,52 @@ pub enum Wear {
 }
 
 impl Assembly {
+    /// Reads mesh files ahead, several at once. The first that cannot be read is the error.
+    pub fn read_ahead<'a>(&mut self, files: Files, paths: impl Iterator<Item = &'a Path>) -> Result<()> {
+        let mut distinct: Vec<(PathBuf, &Path)> = Vec::new();
+        for path in paths {
+            let identity = files.identity(path);
+            if !self.read.contains_key(&identity) && !distinct.iter().any(|(known, _)| *known == identity) {
+                distinct.push((identity, path));
+            }
+        }
+        let next = AtomicUsize::new(0);
+        let work = || {
+            let next = || distinct.get(next.fetch_add(1, Ordering::Relaxed));
+            std::iter::from_fn(next).map(|(identity, path)| (identity, obj::read(files, path))).collect::<Vec<_>>()
+        };
+        let workers = std::thread::available_parallelism().map_or(1, usize::from).min(distinct.len());
+        let mut results: HashMap<_, _> = std::thread::scope(|scope| {
+            let others: Vec<_> = (1..workers).map(|_| scope.spawn(work)).collect();
+            let own = work();
+            own.into_iter().chain(others.into_iter().filter_map(|worker| worker.join().ok()).flatten()).collect()
+        });
+        for (identity, _) in &distinct {
+            if let Some(file) = results.remove(identity) {
+                self.keep(identity.clone(), file?);
+            }
+        }
+        Ok(())
+    }
+
+    fn keep(&mut self, identity: PathBuf, file: ObjFile) {
+        let ObjFile { parts, materials, mut warnings, material_warnings } = file;
+        self.warnings.append(&mut warnings);
+        let mut indices = Vec::with_capacity(parts.len());
+        for part in parts {
+            indices.push((self.meshes.len(), part.material));
+            self.meshes.push(part.mesh);
+        }
+        let file = MeshFile { parts: indices, materials, warnings: material_warnings, first_material: None };
+        self.read.insert(identity, file);
+    }
+
     /// Adds the parts of the mesh file at `path` as one object.
     pub fn add(&mut self, files: Files, path: &Path, wear: Wear, place: &Placement) -> Result<()> {
         let identity = files.identity(path);
         if !self.read.contains_key(&identity) {
-            let ObjFile { parts, materials, mut warnings, material_warnings } = obj::read(files, path)?;
-            self.warnings.append(&mut warnings);
-            let mut indices = Vec::with_capacity(parts.len());
-            for part in parts {
-                indices.push((self.meshes.len(), part.material));
-                self.meshes.push(part.mesh);
-            }
-            let file = MeshFile { parts: indices, materials, warnings: material_warnings, first_material: None };
-            self.read.insert(identity.clone(), file);
+            let file = obj::read(files, path)?;
+            self.keep(identity.clone(), file);
         }
         let Some(file) = self.read.get_mut(&identity) else { return Ok(()) };
         let own = matches!(wear, Wear::Own);

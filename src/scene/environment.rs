@@ -99,3 +99,19 @@ impl Panorama {
         Self { width, height, texels, repaired }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texels_are_repaired_and_counted() {
+        let (nan, infinite) = (f32::NAN, f32::INFINITY);
+        let texels =
+            vec![[1.0, 2.0, 3.0], [nan, 1.0, 1.0], [infinite, -1.0, 0.0], [-infinite, 70000.0, -0.0], [nan; 3]];
+        let panorama = Panorama::new(5, 1, texels);
+        assert_eq!(panorama.repaired, Repairs { texels: 4, nan: 2, infinite: 1, negative: 2 });
+        let expected = [[1.0, 2.0, 3.0], [0.0, 1.0, 1.0], [65504.0, 0.0, 0.0], [0.0, 70000.0, 0.0], [0.0; 3]];
+        assert_eq!(panorama.texels, expected);
+    }
+}

@@ -78,11 +78,17 @@ pub fn read(files: Files, path: &Path) -> Result<SceneFile> {
             assembly.materials.push(Material { name: entry.key.to_owned(), surface: reader.surface(entry)? });
         }
     }
-    let named = assembly.materials.len();
-    if let Some(objects) = root.get("object") {
-        for (number, entry) in objects.tables()?.into_iter().enumerate() {
-            reader.object(entry, number, named, &mut assembly)?;
-        }
+    let objects = root.or("object", Vec::new(), |objects| {
+        objects
+            .tables()?
+            .into_iter()
+            .enumerate()
+            .map(|(i, entry)| reader.object(entry, i, &assembly.materials))
+            .collect()
+    })?;
+    assembly.read_ahead(files, objects.iter().map(|object| object.mesh.as_path()))?;
+    for object in &objects {
+        object.add_to(files, &mut assembly)?;
     }
     Ok(SceneFile { environment, camera, lights, render, assembly })
 }
@@ -109,6 +115,12 @@ struct Reader<'a> {
     files: Files,
     folder: &'a Path,
 }
+
+const DIELECTRIC_KEYS: [&str; 8] =
+    ["kind", "ior", "roughness", "dispersion", "attenuation_color", "attenuation_distance", "thin_walled", "priority"];
+
+const OPAQUE_KEYS: [&str; 7] =
+    ["kind", "base_color", "base_color_texture", "metallic", "roughness", "specular", "emission"];
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -176,33 +188,14 @@ impl Reader<'_> {
     }
 
     fn surface(&self, entry: Entry<'_>) -> Result<Surface> {
-        let kind = entry.any_table("material.NAME")?.require("kind").map_err(|error| match error {
-            Error::Input { path, line, .. } => Error::Input {
-                path,
-                line,
-                message: format!("missing key \"kind\" in [material.{}]; \"dielectric\" or \"opaque\"", entry.key),
-            },
-            other => other,
-        })?;
         let name = format!("material.{}", entry.key);
+        let table = entry.any_table(&name)?;
+        let Some(kind) = table.get("kind") else {
+            return Err(table.error(format!("missing key \"kind\" in [{name}]; \"dielectric\" or \"opaque\"")));
+        };
         match kind.choice(&[("dielectric", Kind::Dielectric), ("opaque", Kind::Opaque)])? {
-            Kind::Dielectric => dielectric(&entry.table(
-                &name,
-                &[
-                    "kind",
-                    "ior",
-                    "roughness",
-                    "dispersion",
-                    "attenuation_color",
-                    "attenuation_distance",
-                    "thin_walled",
-                    "priority",
-                ],
-            )?),
-            Kind::Opaque => self.opaque(&entry.table(
-                &name,
-                &["kind", "base_color", "base_color_texture", "metallic", "roughness", "specular", "emission"],
-            )?),
+            Kind::Dielectric => dielectric(&entry.table(&name, &DIELECTRIC_KEYS)?),
+            Kind::Opaque => self.opaque(&entry.table(&name, &OPAQUE_KEYS)?),
         }
     }
 
@@ -222,31 +215,39 @@ impl Reader<'_> {
         }))
     }
 
-    fn object(&self, entry: Entry<'_>, number: usize, named: usize, assembly: &mut Assembly) -> Result<()> {
+    fn object<'a>(&self, entry: Entry<'a>, number: usize, materials: &[Material]) -> Result<ObjectTable<'a>> {
         let table = entry.table("[object]", &["mesh", "material", "translate", "rotate", "scale", "smooth"])?;
         let mesh = table.require("mesh")?;
         let path = self.path(mesh)?;
         check_mesh_kind(&path).map_err(|message| mesh.error(format!("mesh: {message}")))?;
-        let wear = table.or("material", Wear::Own, |entry| {
-            material_number(entry, &assembly.materials[..named]).map(Wear::Material)
-        })?;
+        let wear = table.or("material", Wear::Own, |entry| material_number(entry, materials).map(Wear::Material))?;
         let translate = table.or("translate", DVec3::ZERO, |entry| entry.triple(&LENGTH))?;
         let degrees = table.or("rotate", DVec3::ZERO, |entry| entry.triple(&FINITE))?;
         let scale = table.or("scale", DVec3::ONE, |entry| entry.number_or_triple(&SCALE))?;
         let smooth = table.or("smooth", true, |entry| entry.boolean())?;
-        let placement = Placement { number, transform: placed(scale, degrees, translate), smooth };
+        let place = Placement { number, transform: placed(scale, degrees, translate), smooth };
+        Ok(ObjectTable { table, mesh: path, wear, place })
+    }
+}
+
+/// What an `[[object]]` says.
+struct ObjectTable<'a> {
+    table: Table<'a>,
+    mesh: PathBuf,
+    wear: Wear,
+    place: Placement,
+}
+
+impl ObjectTable<'_> {
+    fn add_to(&self, files: Files, assembly: &mut Assembly) -> Result<()> {
         let first = assembly.objects.len();
-        assembly.add(self.files, &path, wear, &placement)?;
-        for object in &assembly.objects[first..] {
-            let bounds = assembly.bounds_of(object);
-            // Not to be simplified: NaN must fail too.
-            if !(bounds.reach() <= FARTHEST) {
-                let reach = bounds.reach();
-                return Err(table
-                    .error(format!("the object reaches {reach:.3e} m; at most 1e9 m can be rendered, scale it down")));
-            }
+        assembly.add(files, &self.mesh, self.wear, &self.place)?;
+        let reach =
+            assembly.objects[first..].iter().map(|object| assembly.bounds_of(object).reach()).fold(0.0, f64::max);
+        if reach <= FARTHEST {
+            return Ok(());
         }
-        Ok(())
+        Err(self.table.error(format!("the object reaches {reach:.1e} m; at most 1e9 m can be rendered, scale it down")))
     }
 }
 

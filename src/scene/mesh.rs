@@ -235,3 +235,138 @@ fn mean_normals(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<DVec3> {
         .map(|(sum, any)| sum.try_normalize().unwrap_or_else(|| any.normalize_or(DVec3::Y)))
         .collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn mesh(positions: &[[f32; 3]], normals: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<Mesh, Refusal> {
+        Mesh::new("test", positions.to_vec(), normals.to_vec(), triangles.to_vec())
+    }
+
+    const TETRAHEDRON: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+    const OUTWARD: [[u32; 3]; 4] = [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]];
+
+    fn faults(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> MeshFaults {
+        mesh(positions, &[], triangles).unwrap().faults
+    }
+
+    /// Scaled by `size` and moved by `shift` along x, with indices behind those of `positions`.
+    fn add(positions: &mut Vec<[f32; 3]>, triangles: &mut Vec<[u32; 3]>, size: f32, shift: f32, inward: bool) {
+        let first = positions.len() as u32;
+        positions.extend(TETRAHEDRON.map(|[x, y, z]| [x * size + shift, y * size + shift, z * size + shift]));
+        triangles
+            .extend(OUTWARD.map(|[a, b, c]| if inward { [c, b, a] } else { [a, b, c] }.map(|vertex| vertex + first)));
+    }
+
+    #[test]
+    fn a_closed_body_has_no_faults() {
+        assert!(faults(&TETRAHEDRON, &OUTWARD).is_empty());
+        assert_eq!(faults(&TETRAHEDRON, &OUTWARD).to_string(), "no faults");
+        // Split vertices are welded, minus zero is zero.
+        let split: Vec<_> = OUTWARD
+            .iter()
+            .flatten()
+            .map(|&vertex| TETRAHEDRON[vertex as usize].map(|x| if x == 0.0 { -x } else { x }))
+            .collect();
+        assert!(faults(&split, &[[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]]).is_empty());
+    }
+
+    #[test]
+    fn open_edges_are_counted() {
+        let faults = faults(&TETRAHEDRON, &OUTWARD[..3]);
+        assert_eq!(faults, MeshFaults { open_edges: 3, ..MeshFaults::default() });
+        assert!(!faults.is_closed());
+        assert_eq!(faults.to_string(), "3 open edges; the surface is not closed, so it bounds no medium");
+    }
+
+    #[test]
+    fn a_flipped_triangle_is_inconsistent_along_its_edges() {
+        let mut triangles = OUTWARD;
+        triangles[3].swap(0, 1);
+        assert_eq!(faults(&TETRAHEDRON, &triangles), MeshFaults { inconsistent_edges: 3, ..MeshFaults::default() });
+    }
+
+    #[test]
+    fn a_fin_makes_an_edge_non_manifold() {
+        let mut positions = TETRAHEDRON.to_vec();
+        positions.push([-1.0, -1.0, 0.0]);
+        let mut triangles = OUTWARD.to_vec();
+        triangles.push([0, 1, 4]);
+        let faults = faults(&positions, &triangles);
+        assert_eq!((faults.non_manifold_edges, faults.inconsistent_edges, faults.open_edges), (1, 1, 2));
+        assert!(!faults.is_closed());
+    }
+
+    #[test]
+    fn bodies_inside_out_are_told_from_cavities() {
+        let shells = |shells: &[(f32, f32, bool)]| {
+            let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+            for &(size, shift, inward) in shells {
+                add(&mut positions, &mut triangles, size, shift, inward);
+            }
+            faults(&positions, &triangles)
+        };
+        assert_eq!(shells(&[(1.0, 0.0, true)]).inverted_shells, 1);
+        assert!(shells(&[(1.0, 0.0, false), (0.25, 0.125, true)]).is_empty());
+        // Beside the body, though inside its box.
+        assert_eq!(shells(&[(1.0, 0.0, false), (0.25, 0.625, true)]).inverted_shells, 1);
+        assert_eq!(shells(&[(1.0, 0.0, true), (0.25, 0.125, false)]).inverted_shells, 1);
+        assert_eq!(shells(&[(1.0, 0.0, true), (1.0, 5.0, true)]).to_string(), "2 shells inside out");
+    }
+
+    #[test]
+    fn triangles_without_area_are_removed_and_do_not_open_the_surface() {
+        let mut positions = TETRAHEDRON.to_vec();
+        positions.extend([[0.5, 0.0, 0.0], [9.0, 9.0, 9.0]]);
+        // The middle of an edge joined by a sliver, and a triangle that names one vertex twice.
+        let triangles = [[0, 2, 4], [4, 2, 1], [0, 4, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3], [1, 1, 3]];
+        let mesh = mesh(&positions, &[], &triangles).unwrap();
+        assert_eq!(mesh.faults, MeshFaults { degenerate_triangles: 2, unused_vertices: 1, ..MeshFaults::default() });
+        assert_eq!(mesh.triangles.len(), 5);
+        assert_eq!(mesh.faults.to_string(), "2 degenerate triangles removed, 1 unused vertex");
+    }
+
+    #[test]
+    fn what_cannot_be_used_is_refused_with_counts() {
+        let mut positions = TETRAHEDRON.to_vec();
+        positions[1][2] = f32::NAN;
+        positions[3][0] = f32::NEG_INFINITY;
+        assert_eq!(mesh(&positions, &[], &OUTWARD).unwrap_err(), Refusal::BadVertices { count: 2, first: 1 });
+        positions[1][2] = 1e30;
+        assert_eq!(mesh(&positions, &[], &OUTWARD).unwrap_err(), Refusal::BadVertices { count: 2, first: 1 });
+        let refusal = mesh(&TETRAHEDRON, &[], &[[0, 1, 2], [0, 1, 4], [u32::MAX, 0, 1]]).unwrap_err();
+        assert_eq!(refusal, Refusal::BadIndices { count: 2, first: 1, vertices: 4 });
+        assert_eq!(mesh(&TETRAHEDRON, &[], &[]).unwrap_err(), Refusal::NoTriangles { degenerate: 0 });
+        let refusal = mesh(&TETRAHEDRON, &[], &[[0, 0, 1]]).unwrap_err();
+        assert_eq!(refusal.to_string(), "holds no triangles but 1 without an area; check the scale of the export");
+        assert!(mesh(&[], &[], &[]).is_err());
+    }
+
+    #[test]
+    fn normals_become_unit_vectors_and_bad_ones_those_of_the_faces() {
+        // Two triangles over the edge 0 - 1: one of area 1/2 facing +z, one of area 1 facing -y.
+        let positions = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 2.0]];
+        let triangles = [[0, 1, 2], [0, 1, 3]];
+        let normals = [[0.0; 3], [f32::NAN, 0.0, 0.0], [0.0, 0.0, 1e-30], [0.0, f32::NEG_INFINITY, 0.0]];
+        let mended = mesh(&positions, &normals, &triangles).unwrap();
+        assert_eq!(mended.faults.replaced_normals, 3);
+        let expected = DVec3::new(0.0, -2.0, 1.0).normalize().as_vec3().to_array();
+        assert_eq!(mended.normals, [expected, expected, [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]);
+    }
+
+    #[test]
+    fn normals_against_their_faces_are_counted() {
+        let inward = [[0.0, 0.0, 1.0], [0.0, 0.0, -3.0], [0.0, 0.0, 1.0]];
+        let triangle = mesh(&TETRAHEDRON[..3], &inward, &[[0, 1, 2]]).unwrap();
+        assert_eq!(triangle.faults.opposed_normals, 1);
+        assert_eq!(triangle.normals[1], [0.0, 0.0, -1.0]);
+    }
+
+    #[test]
+    fn no_usable_normal_means_no_normals() {
+        let none = mesh(&TETRAHEDRON, &[[0.0; 3]; 4], &OUTWARD).unwrap();
+        assert!(none.normals.is_empty() && none.faults.is_empty());
+        assert!(mesh(&TETRAHEDRON, &[[0.0, 0.0, 1.0]; 3], &OUTWARD).unwrap().normals.is_empty());
+    }
+}

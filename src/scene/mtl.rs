@@ -74,7 +74,7 @@ fn read(files: Files, path: &Path, remarks: &mut Vec<String>) -> Vec<Material> {
     }
     match tobj::load_mtl_buf(&mut tidy.as_bytes()) {
         Ok((materials, _)) => {
-            materials.into_iter().map(|m| Converter { path, remarks, material: &m }.convert()).collect()
+            materials.into_iter().map(|m| Converter { files, path, remarks, material: &m }.convert()).collect()
         }
         Err(error) => {
             remarks.push(format!("{}: cannot be read as MTL: {error}", path.display()));
@@ -132,6 +132,7 @@ fn image_name(mut rest: &str) -> Option<String> {
 }
 
 struct Converter<'a> {
+    files: Files,
     path: &'a Path,
     remarks: &'a mut Vec<String>,
     material: &'a tobj::Material,
@@ -184,12 +185,20 @@ impl Converter<'_> {
         let metallic =
             self.number("Pm").map_or(plain.metallic, |m| self.within("Pm", m.into(), 0.0, 1.0, plain.metallic));
         let matt = matches!(self.material.illumination_model, Some(0 | 1)) || self.material.specular == Some([0.0; 3]);
-        let texture = self.material.diffuse_texture.as_ref().map(|name| {
-            // Exporters for Windows write its separator.
-            self.path.parent().unwrap_or(Path::new("")).join(name.replace('\\', "/"))
-        });
+        let texture = self.texture();
         let specular = if matt { 0.0 } else { plain.specular };
         Opaque { base_color, base_color_texture: texture, metallic, roughness, specular, emission }
+    }
+
+    fn texture(&mut self) -> Option<PathBuf> {
+        // Exporters for Windows write its separator.
+        let name = self.material.diffuse_texture.as_ref()?.replace('\\', "/");
+        let path = self.path.parent().unwrap_or(Path::new("")).join(name);
+        if self.files.exists(&path) {
+            return Some(path);
+        }
+        self.remark(&format!("map_Kd {:?} does not exist; the colour is used", path.display().to_string()));
+        None
     }
 
     fn number(&self, key: &str) -> Option<f32> {

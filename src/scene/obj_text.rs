@@ -125,15 +125,19 @@ impl Tidy {
             ));
         }
         let unused = used.iter().filter(|used| !**used).count();
-        for (count, what) in [
-            (slivers, "faces with less than three corners left out"),
-            (wires, "lines and points left out; only faces are shown"),
-            (free_form, "lines of free-form geometry left out; export triangles"),
-            (unused, "unused vertices left out"),
-            (unknown.len(), "lines not understood and left out"),
+        for (count, one, many) in [
+            (slivers, "face with less than three corners", "faces with less than three corners"),
+            (wires, "line or point, as only faces are shown,", "lines and points, as only faces are shown,"),
+            (
+                free_form,
+                "line of free-form geometry, which should be triangles,",
+                "lines of free-form geometry, which should be triangles,",
+            ),
+            (unused, "unused vertex", "unused vertices"),
+            (unknown.len(), "line not understood", "lines not understood"),
         ] {
             if count > 0 {
-                self.remarks.push(format!("{count} {what}"));
+                self.remarks.push(format!("{count} {} left out", if count == 1 { one } else { many }));
             }
         }
         if let (Some(first), Some(remark)) = (unknown.first(), self.remarks.last_mut()) {
@@ -240,7 +244,7 @@ pub fn bad_number(text: &str) -> Option<Fault> {
         for word in rest.split_ascii_whitespace().take(3) {
             match word.parse::<f32>() {
                 Err(_) => return Some((number, format!("{:?} is no number; expected {keyword} X Y Z", excerpt(word)))),
-                Ok(value) if keyword == "v" && !(f64::from(value.abs()) <= FARTHEST) => {
+                Ok(value) if keyword == "v" && (value.is_nan() || f64::from(value.abs()) > FARTHEST) => {
                     count += 1;
                     first.get_or_insert_with(|| {
                         let wanted = format!("coordinates must be finite and not beyond {FARTHEST:e}");
@@ -289,5 +293,89 @@ fn excerpt(line: &str) -> String {
     match line.trim().char_indices().nth(LONGEST) {
         Some((end, _)) => format!("{}...", &line.trim()[..end]),
         None => line.trim().to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const TRIANGLE: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\n";
+
+    fn tidy(text: &str) -> Tidy {
+        Tidy::new(text).unwrap()
+    }
+
+    fn fault(text: &str) -> Fault {
+        Tidy::new(text).unwrap_err()
+    }
+
+    #[test]
+    fn what_tobj_misreads_is_rewritten() {
+        let text = "v 0 0 0 1 2 3 9\nv 1 0 0 5\nv 0 1 \\\n0\nvt 0 0\nvn 0 0 1\nf -3/1/1 -2 +3//-1\nl 1 2 3\n";
+        let expected = "mtllib -\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 0 0 0\nf 1//1 2//2 3//1\n";
+        assert_eq!(tidy(text).text, expected);
+        assert_eq!(tidy(text).remarks, ["1 line or point, as only faces are shown, left out"]);
+    }
+
+    #[test]
+    fn faces_may_come_before_their_vertices() {
+        let text = format!("usemtl red\tglass\nf 1 2 3\n{TRIANGLE}");
+        assert!(tidy(&text).text.ends_with("vn 0 0 0\nusemtl red\tglass\nf 1 2 3\n"));
+        assert_eq!(tidy(&text).materials, ["red\tglass"]);
+    }
+
+    #[test]
+    fn indices_out_of_range_are_counted_with_the_first_line() {
+        let (line, message) = fault(&format!("{TRIANGLE}f 1 2 3\nf 1 2 4\nf 0 1 2\nf 1 2 3//1\n"));
+        assert_eq!(line, 5);
+        assert_eq!(message, "a face names vertex 4, which does not exist (the file has 3); so do 2 more faces");
+        assert!(fault(&format!("f -1 2 3\n{TRIANGLE}")).1.contains("vertex -1"));
+        assert!(fault(&format!("{TRIANGLE}f 1/1 2/1 3/1\n")).1.contains("texture coordinate 1"));
+    }
+
+    #[test]
+    fn malformed_lines_are_named() {
+        for (line, expected) in [
+            ("f 1 2 x", "\"f 1 2 x\": \"x\" is no index"),
+            ("f 1 2 99999999999999999999", "is no index"),
+            ("f 1/1/1/1 2 3", "is no corner"),
+            ("f /1 2 3", "is no corner"),
+            ("v 1 2", "\"v 1 2\" lacks a number; expected v X Y Z"),
+            ("vn", "expected vn X Y Z"),
+        ] {
+            let (number, message) = fault(&format!("{TRIANGLE}{line}\n"));
+            assert_eq!(number, 4);
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
+    #[test]
+    fn what_is_left_out_is_counted() {
+        let text = format!("{TRIANGLE}v 5 5 5\nf 1 2\nf\nf 1 2 3\np 1\ncurv 0 1 1 2\n% hello\n\u{1}\u{2}\n");
+        assert_eq!(
+            tidy(&text).remarks,
+            [
+                "2 faces with less than three corners left out",
+                "1 line or point, as only faces are shown, left out",
+                "1 line of free-form geometry, which should be triangles, left out",
+                "1 unused vertex left out",
+                "2 lines not understood left out, the first is line 10",
+            ]
+        );
+    }
+
+    #[test]
+    fn bad_numbers_are_found_with_their_count() {
+        let (line, message) = bad_number("v 0 0 0\nv 0 nan 0\nv 1e39 0 -inf\nv 2e9 0 0\n").unwrap();
+        assert_eq!(
+            (line, message.as_str()),
+            (2, "vertex coordinate nan: coordinates must be finite and not beyond 1e9; so in 3 vertices")
+        );
+        assert_eq!(bad_number("v 0 0 0\nvn 0 nan 0\n"), None);
+        assert_eq!(
+            bad_number("v 0 0 0\nvn 0 zero 0\n").unwrap(),
+            (2, "\"zero\" is no number; expected vn X Y Z".into())
+        );
     }
 }

@@ -202,7 +202,7 @@ impl<'a> Entry<'a> {
     /// Three numbers that `rule` holds for.
     pub fn triple(&self, rule: &Rule) -> Result<DVec3> {
         let DeValue::Array(array) = self.value.get_ref() else {
-            return Err(self.unexpected(&format!("[x, y, z], each {}", rule.wanted)));
+            return Err(self.unexpected(&format!("three numbers, each {}", rule.wanted)));
         };
         if array.len() != 3 {
             return Err(self.unexpected("three numbers"));

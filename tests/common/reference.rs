@@ -74,7 +74,8 @@ impl<'a> Reference<'a> {
             let face = (b - a).cross(c - a);
             let slope = face.dot(direction);
             let distance = face.dot(a - origin) / slope;
-            if !(distance > 0.0) || nearest.is_some_and(|hit| hit.distance <= distance) {
+            // Not a number where the face is seen on edge.
+            if distance.is_nan() || distance <= 0.0 || nearest.is_some_and(|hit| hit.distance <= distance) {
                 continue;
             }
             let point = origin + distance * direction;

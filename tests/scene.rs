@@ -1,0 +1,705 @@
+//! Scene files, meshes and materials as a user writes them: what is read, and what is said about what is wrong.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+use tempfile::TempDir;
+use vitrum::options::Model;
+use vitrum::scene::{Dielectric, Opaque, Overrides, Scene, Surface, Surroundings};
+
+/// A folder with a closed mesh, an image and whatever a test adds.
+struct Folder(TempDir);
+
+const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+
+impl Folder {
+    fn new() -> Self {
+        let folder = Self(tempfile::tempdir().unwrap());
+        folder.write("body.obj", TETRAHEDRON);
+        image::RgbImage::from_pixel(4, 2, image::Rgb([255, 0, 188])).save(folder.path("sky.png")).unwrap();
+        folder
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn write(&self, name: &str, content: impl AsRef<[u8]>) {
+        fs::write(self.path(name), content).unwrap();
+    }
+
+    fn load(&self, name: &str) -> vitrum::Result<Scene> {
+        Scene::load(Some(&self.path(name)), &Overrides::default())
+    }
+
+    fn scene(&self, text: &str) -> vitrum::Result<Scene> {
+        self.write("scene.toml", text);
+        self.load("scene.toml")
+    }
+
+    /// The error in `text`, as "line: message" with the folder's path cut out.
+    fn fault(&self, text: &str) -> String {
+        let error = self.scene(text).expect_err(text);
+        assert_eq!(error.exit_code(), 2);
+        let folder = format!("{}/", self.0.path().display());
+        error.to_string().replace(&folder, "").replace("scene.toml:", "")
+    }
+
+    /// The scene of one object that shows `body.obj` with these lines in its material.
+    fn material(&self, kind: &str, lines: &str) -> vitrum::Result<Scene> {
+        self.scene(&format!(
+            "[material.m]\nkind = {kind:?}\n{lines}\n[[object]]\nmesh = \"body.obj\"\nmaterial = \"m\"\n"
+        ))
+    }
+}
+
+fn dielectric(scene: &Scene, index: usize) -> &Dielectric {
+    match &scene.materials[scene.objects[index].material].surface {
+        Surface::Dielectric(dielectric) => dielectric,
+        other => panic!("{other:?}"),
+    }
+}
+
+fn opaque(scene: &Scene, index: usize) -> &Opaque {
+    match &scene.materials[scene.objects[index].material].surface {
+        Surface::Opaque(opaque) => opaque,
+        other => panic!("{other:?}"),
+    }
+}
+
+const EVERYTHING: &str = r#"
+[environment]
+image = "sky.png"
+intensity = 2
+rotation = 90.0
+visible = false
+
+[camera]
+position = [0, 0.25, 0.9]
+target = [0.0, 0.1, 0.0]
+up = [0, 0, -1]
+vertical_fov = 50
+
+[render]
+model = "path"
+size = [320, 200]
+samples = 7
+
+[[light]]
+kind = "point"
+position = [1.0, 2.0, 1.0]
+intensity = [10, 10, 5]
+
+[material.glass]
+kind = "dielectric"
+ior = "BK7"
+roughness = 0.25
+dispersion = 0.3
+attenuation_color = [1, 0.5, 0]
+attenuation_distance = 0.2
+thin_walled = true
+priority = -3
+
+[material."oak table"]
+kind = "opaque"
+base_color_texture = "sky.png"
+metallic = 0.5
+roughness = 0.75
+specular = 0.125
+emission = [0, 0, 12]
+
+[[object]]
+mesh = "body.obj"
+material = "glass"
+translate = [1, 2, 3]
+rotate = [90, 0, 90]
+scale = [1, 2, -3]
+smooth = false
+
+[[object]]
+mesh = "./body.obj"
+material = "oak table"
+"#;
+
+#[test]
+fn everything_is_read() {
+    let folder = Folder::new();
+    let scene = folder.scene(EVERYTHING).unwrap();
+    assert_eq!(scene.name, folder.path("scene.toml").display().to_string());
+    let Surroundings::Image(panorama) = &scene.environment.light else { panic!() };
+    assert_eq!((panorama.width, panorama.height), (4, 2));
+    assert!((panorama.texels[0][2] - 0.502_886_5).abs() < 1e-6);
+    assert_eq!((scene.environment.intensity, scene.environment.visible), (2.0, false));
+    assert!((scene.environment.rotation - std::f64::consts::FRAC_PI_2).abs() < 1e-15);
+    assert_eq!(scene.camera.position, DVec3::new(0.0, 0.25, 0.9));
+    assert_eq!((scene.camera.target, scene.camera.up), (DVec3::new(0.0, 0.1, 0.0), DVec3::NEG_Z));
+    assert!((scene.camera.vertical_fov - 50.0_f64.to_radians()).abs() < 1e-15);
+    assert_eq!((scene.render.model, scene.render.samples), (Some(Model::Path), Some(7)));
+    assert_eq!(scene.lights.len(), 1);
+    assert_eq!(scene.lights[0].intensity, DVec3::new(10.0, 10.0, 5.0));
+
+    assert_eq!(
+        dielectric(&scene, 0),
+        &Dielectric {
+            ior: 1.5168,
+            roughness: 0.25,
+            dispersion: 0.3,
+            attenuation_color: DVec3::new(1.0, 0.5, 0.0),
+            attenuation_distance: 0.2,
+            thin_walled: true,
+            priority: -3,
+        }
+    );
+    assert_eq!(
+        opaque(&scene, 1),
+        &Opaque {
+            base_color: DVec3::splat(0.8),
+            base_color_texture: Some(folder.path("sky.png")),
+            metallic: 0.5,
+            roughness: 0.75,
+            specular: 0.125,
+            emission: DVec3::new(0.0, 0.0, 12.0),
+        }
+    );
+    assert_eq!(scene.meshes.len(), 1, "one file is read once");
+    assert_eq!((scene.objects[0].number, scene.objects[1].number), (0, 1));
+    assert_eq!((scene.objects[0].smooth, scene.objects[1].smooth), (false, true));
+    // Scaled, then about x, then about z: +y becomes +z, which stays; +x becomes +y; -z becomes +y becomes -x.
+    let transform = scene.objects[0].transform;
+    let close = |point: DVec3, expected: [f64; 3]| {
+        let found = transform.transform_point3(point);
+        assert!((found - DVec3::from(expected)).length() < 1e-12, "{found}");
+    };
+    close(DVec3::ZERO, [1.0, 2.0, 3.0]);
+    close(DVec3::X, [1.0, 3.0, 3.0]);
+    close(DVec3::Y, [1.0, 2.0, 5.0]);
+    close(DVec3::Z, [-2.0, 2.0, 3.0]);
+    assert!(transform.matrix3.determinant() < 0.0);
+    let bounds = scene.bounds().unwrap();
+    assert!((bounds.min - DVec3::new(-2.0, 0.0, 0.0)).length() < 1e-12, "{bounds:?}");
+    assert!((bounds.max - DVec3::new(1.0, 3.0, 5.0)).length() < 1e-12, "{bounds:?}");
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+}
+
+#[test]
+fn a_scene_that_says_little_gets_the_defaults() {
+    let folder = Folder::new();
+    let scene = folder.scene("[[object]]\nmesh = \"body.obj\"\n").unwrap();
+    assert_eq!(dielectric(&scene, 0), &Dielectric::default());
+    assert!(matches!(&scene.environment.light, Surroundings::Image(panorama) if panorama.width == 512));
+    assert_eq!(scene.warnings, ["city.exr: repaired 158 texels (0 NaN, 0 infinite, 158 negative)"]);
+    assert_eq!(scene.camera, vitrum::scene::Camera::framing(scene.bounds().unwrap()));
+    let empty = folder.scene("").unwrap();
+    assert!(empty.objects.is_empty() && empty.bounds().is_none());
+    let color = folder.scene("[environment]\ncolor = [1, 0.5, 0]").unwrap();
+    assert!(matches!(color.environment.light, Surroundings::Color(c) if c == DVec3::new(1.0, 0.5, 0.0)));
+    let dark = folder.scene("[environment]\ncolor = [0, 0, 0]\nintensity = 0").unwrap();
+    assert_eq!(dark.environment.intensity, 0.0);
+    let infinite = folder.material("dielectric", "attenuation_distance = inf\nattenuation_color = [0, 0, 0]").unwrap();
+    assert!(dielectric(&infinite, 0).attenuation_distance.is_infinite());
+    assert_eq!(opaque(&folder.material("opaque", "").unwrap(), 0), &Opaque::default());
+}
+
+#[test]
+fn unknown_keys_list_the_allowed_ones() {
+    let folder = Folder::new();
+    let cases = [
+        ("\nfog = 1", "2: unknown key \"fog\"; allowed here: environment, camera, render, light, material, object"),
+        (
+            "[environment]\ncolor = [1, 1, 1]\nimagge = 1",
+            "3: unknown key \"imagge\" in [environment]; allowed here: image, color, intensity, rotation, visible",
+        ),
+        (
+            "[camera]\nposition = [0, 0, 1]\nfov = 3",
+            "3: unknown key \"fov\" in [camera]; allowed here: position, target, up, vertical_fov",
+        ),
+        (
+            "[[light]]\nkind = \"point\"\ncolor = 1",
+            "3: unknown key \"color\" in [[light]]; allowed here: kind, position, intensity",
+        ),
+        (
+            "[[object]]\nmesh = \"body.obj\"\n\nrotation = 1",
+            "4: unknown key \"rotation\" in [[object]]; allowed here: mesh, material, translate, rotate, scale, smooth",
+        ),
+        (
+            "[material.m]\nkind = \"dielectric\"\nroughnes = 1",
+            "3: unknown key \"roughnes\" in [material.m]; allowed here: kind, ior, roughness, dispersion, attenuation_color, attenuation_distance, thin_walled, priority",
+        ),
+        (
+            "[material.m]\nkind = \"opaque\"\nior = 1",
+            "3: unknown key \"ior\" in [material.m]; allowed here: kind, base_color, base_color_texture, metallic, roughness, specular, emission",
+        ),
+    ];
+    for (text, expected) in cases {
+        assert_eq!(folder.fault(text), expected);
+    }
+    let render = folder.fault("[render]\nsamples = 4\nmodle = \"path\"");
+    assert!(
+        render.starts_with("3: unknown key \"modle\" in [render]; allowed here: model, size, samples, max_depth, "),
+        "{render}"
+    );
+}
+
+#[test]
+fn values_of_the_wrong_type_or_range_say_what_is_expected() {
+    let folder = Folder::new();
+    let head = "[material.m]\nkind = \"dielectric\"\n";
+    let matt = "[material.m]\nkind = \"opaque\"\n";
+    let object = "[[object]]\nmesh = \"body.obj\"\n";
+    let cases = [
+        (format!("{head}ior = 0"), "3: ior: expected a number above 0, found 0"),
+        (format!("{head}ior = -1.5"), "3: ior: expected a number above 0, found -1.5"),
+        (format!("{head}ior = nan"), "3: ior: expected a number above 0, found nan"),
+        (format!("{head}ior = inf"), "3: ior: expected a number above 0, found inf"),
+        (format!("{head}ior = 1e99"), "3: ior: expected a number above 0, found 1e99"),
+        (format!("{head}ior = [1.5]"), "3: ior: expected a number above 0, found an array of 1"),
+        (format!("{head}roughness = 1.01"), "3: roughness: expected a number from 0 to 1, found 1.01"),
+        (format!("{head}roughness = true"), "3: roughness: expected a number from 0 to 1, found true"),
+        (format!("{head}roughness = \"low\""), "3: roughness: expected a number from 0 to 1, found \"low\""),
+        (format!("{head}dispersion = -0.1"), "3: dispersion: expected a number from 0 to 1e9, found -0.1"),
+        (
+            format!("{head}attenuation_color = [1, 2, 1]"),
+            "3: attenuation_color: expected a number from 0 to 1, found 2",
+        ),
+        (
+            format!("{head}attenuation_color = [1, 1]"),
+            "3: attenuation_color: expected three numbers, found an array of 2",
+        ),
+        (
+            format!("{head}attenuation_distance = 0"),
+            "3: attenuation_distance: expected a number above 0, or inf, found 0",
+        ),
+        (
+            format!("{head}attenuation_distance = -inf"),
+            "3: attenuation_distance: expected a number above 0, or inf, found -inf",
+        ),
+        (format!("{head}thin_walled = 1"), "3: thin_walled: expected true or false, found 1"),
+        (
+            format!("{head}priority = 1.5"),
+            "3: priority: expected a whole number from -2147483648 to 2147483647, found 1.5",
+        ),
+        (
+            format!("{head}priority = 3000000000"),
+            "3: priority: expected a whole number from -2147483648 to 2147483647, found 3000000000",
+        ),
+        (format!("{matt}base_color = [1, 1, 1.5]"), "3: base_color: expected a number from 0 to 1, found 1.5"),
+        (format!("{matt}emission = [0, nan, 0]"), "3: emission: expected a number from 0 to 1e9, found nan"),
+        (format!("{matt}metallic = 2"), "3: metallic: expected a number from 0 to 1, found 2"),
+        ("[material.m]\nkind = \"glass\"".into(), "2: kind: expected \"dielectric\" or \"opaque\", found \"glass\""),
+        ("[material.m]\nior = 1".into(), "1: missing key \"kind\" in [material.m]; \"dielectric\" or \"opaque\""),
+        ("material = 3".into(), "1: material: expected a table, [material.NAME], found 3"),
+        ("[material]\nm = 3".into(), "2: m: expected a table, [material.m], found 3"),
+        (format!("{object}scale = 0"), "3: scale: expected a number other than 0 from -1e9 to 1e9, found 0"),
+        (format!("{object}scale = [1, 0, 1]"), "3: scale: expected a number other than 0 from -1e9 to 1e9, found 0"),
+        (format!("{object}scale = inf"), "3: scale: expected a number other than 0 from -1e9 to 1e9, found inf"),
+        (format!("{object}rotate = 90"), "3: rotate: expected three numbers, each a finite number, found 90"),
+        (
+            format!("{object}translate = [0, 1e30, 0]"),
+            "3: translate: expected a number of metres from -1e9 to 1e9, found 1e30",
+        ),
+        (format!("{object}smooth = \"no\""), "3: smooth: expected true or false, found \"no\""),
+        (format!("{object}material = \"\""), "3: material: expected the name of a material, found \"\""),
+        ("[[object]]\nmesh = 3".into(), "2: mesh: expected a file name, found 3"),
+        ("[[object]]\nscale = 3".into(), "1: missing key \"mesh\" in [[object]]"),
+        ("[object]\nmesh = \"body.obj\"".into(), "1: object: expected tables, each headed [[object]], found a table"),
+        ("object = [1]".into(), "1: object: expected a table, [[object]], found 1"),
+        ("environment = 1".into(), "1: environment: expected a table, [environment], found 1"),
+        ("[environment]\ncolor = [1, -1, 1]".into(), "2: color: expected a number from 0 to 1e9, found -1"),
+        (
+            "[environment]\ncolor = [1, 1, 1]\nintensity = nan".into(),
+            "3: intensity: expected a number from 0 to 1e9, found nan",
+        ),
+        ("[environment]\ncolor = [1, 1, 1]\nrotation = inf".into(), "3: rotation: expected a finite number, found inf"),
+        ("[environment]\ncolor = [1, 1, 1]\nvisible = 0".into(), "3: visible: expected true or false, found 0"),
+        ("[[light]]\nposition = [0, 0, 0]".into(), "1: missing key \"kind\" in [[light]]"),
+        ("[[light]]\nkind = \"sun\"".into(), "2: kind: expected \"point\", found \"sun\""),
+        (
+            "[[light]]\nkind = \"point\"\nposition = [0, 0, 0]\nintensity = [1, 1, -1]".into(),
+            "4: intensity: expected a number from 0 to 1e9, found -1",
+        ),
+    ];
+    for (text, expected) in cases {
+        assert_eq!(folder.fault(&text), expected, "in {text}");
+    }
+}
+
+#[test]
+fn glasses_are_named() {
+    let folder = Folder::new();
+    assert_eq!(dielectric(&folder.material("dielectric", "ior = \"water\"").unwrap(), 0).ior, 1.33299);
+    let fault = folder.fault("[material.m]\nkind = \"dielectric\"\n\nior = \"bk9\"\n");
+    assert!(fault.starts_with("4: unknown glass \"bk9\"; known: acrylic, baf10, bk7, diamond"), "{fault}");
+}
+
+#[test]
+fn environments_have_one_source() {
+    let folder = Folder::new();
+    let cases = [
+        (
+            "[environment]\nimage = \"sky.png\"\ncolor = [1, 1, 1]",
+            "3: [environment] has both image and color; keep one of them",
+        ),
+        ("\n[environment]\nintensity = 1", "2: [environment] has neither image nor color; give one of them"),
+        ("[environment]\nimage = \"none.exr\"", "2: image: \"none.exr\" does not exist"),
+        ("[environment]\nimage = \".\"", "2: image: \".\" is a folder, not a file"),
+        (
+            "[environment]\nimage = \"body.obj\"",
+            "body.obj: is no image of a known kind; known: .exr, .hdr, .png, .jpg, .jpeg",
+        ),
+        ("[environment]\nimage = \"\"", "2: image: expected a file name, found \"\""),
+    ];
+    for (text, expected) in cases {
+        assert_eq!(folder.fault(text), expected);
+    }
+}
+
+#[test]
+fn cameras_must_see_something() {
+    let folder = Folder::new();
+    let camera = |lines: &str| folder.fault(&format!("\n[camera]\n{lines}"));
+    assert_eq!(camera("target = [0, 0, 0]"), "2: missing key \"position\" in [camera]");
+    assert_eq!(camera("position = [0, 0, 0]"), "2: missing key \"target\" in [camera]");
+    let front = "position = [0, 0, 1]\ntarget = [0, 0, 0]\n";
+    assert_eq!(
+        camera("position = [0, 0, 1]\ntarget = [0, 0, 1]"),
+        "2: [camera]: position and target must be different points"
+    );
+    assert!(camera(&format!("{front}up = [0, 0, 5]")).contains("up must not be parallel"));
+    for fov in ["0", "180", "-10", "nan"] {
+        let expected = format!("5: vertical_fov: expected an angle above 0 and below 180 degrees, found {fov}");
+        assert_eq!(camera(&format!("{front}vertical_fov = {fov}")), expected);
+    }
+}
+
+#[test]
+fn materials_of_objects_must_exist() {
+    let folder = Folder::new();
+    let object = "[[object]]\nmesh = \"body.obj\"\nmaterial = \"gold\"\n";
+    assert_eq!(folder.fault(object), "3: unknown material \"gold\"; defined: none; add [material.NAME]");
+    let materials = "[material.a]\nkind = \"opaque\"\n[material.b]\nkind = \"dielectric\"\n";
+    assert_eq!(folder.fault(&format!("{object}{materials}")), "3: unknown material \"gold\"; defined: a, b");
+}
+
+#[test]
+fn render_options_are_checked_and_named() {
+    let folder = Folder::new();
+    assert!(
+        folder.fault("[render]\nsamples = 0").starts_with("2: samples: "),
+        "{}",
+        folder.fault("[render]\nsamples = 0")
+    );
+    assert!(folder.fault("[render]\nmodel = \"fast\"").contains("unknown variant `fast`, expected one of `single`"));
+    assert!(folder.fault("[render]\nsize = [0, 4]").starts_with("2: size: "));
+    assert!(folder.fault("render = 4").contains("expected a table, [render], found 4"));
+    assert!(folder.fault("[render]\neffects = \"fog\"").contains("unknown effect \"fog\""));
+    assert_eq!(folder.fault("[render]\nenv = \"none.exr\""), "2: env: \"none.exr\" does not exist");
+}
+
+#[test]
+fn the_command_line_wins_over_render_and_render_over_the_scene() {
+    let folder = Folder::new();
+    image::RgbImage::from_pixel(8, 2, image::Rgb([9, 9, 9])).save(folder.path("other.png")).unwrap();
+    let text = "[environment]\ncolor = [1, 1, 1]\nintensity = 3\n[render]\nior = 1.2\nroughness = 0.5\nenv = \"sky.png\"\n\
+        [material.glass]\nkind = \"dielectric\"\nior = \"diamond\"\n[material.matt]\nkind = \"opaque\"\nroughness = 0.7\n\
+        [[object]]\nmesh = \"body.obj\"\nmaterial = \"glass\"\n[[object]]\nmesh = \"body.obj\"\nmaterial = \"matt\"\n\
+        [[object]]\nmesh = \"body.obj\"\n";
+    let width = |scene: &Scene| match &scene.environment.light {
+        Surroundings::Image(panorama) => panorama.width,
+        Surroundings::Color(_) => 0,
+    };
+    let scene = folder.scene(text).unwrap();
+    for glass in [0, 2] {
+        assert_eq!((dielectric(&scene, glass).ior, dielectric(&scene, glass).roughness), (1.2, 0.5));
+    }
+    assert_eq!(opaque(&scene, 1).roughness, 0.7);
+    assert_eq!((width(&scene), scene.environment.intensity), (4, 3.0));
+    assert_eq!(scene.render.env, Some(folder.path("sky.png")));
+
+    let overrides = Overrides { ior: Some(1.9), roughness: Some(0.0), environment: Some(folder.path("other.png")) };
+    let scene = Scene::load(Some(&folder.path("scene.toml")), &overrides).unwrap();
+    assert_eq!((dielectric(&scene, 0).ior, dielectric(&scene, 0).roughness), (1.9, 0.0));
+    assert_eq!((width(&scene), scene.environment.intensity), (8, 3.0));
+
+    for (ior, roughness) in [(Some(0.0), None), (Some(f64::NAN), None), (None, Some(1.5)), (None, Some(f64::NAN))] {
+        let overrides = Overrides { ior, roughness, environment: None };
+        assert_eq!(Scene::load(None, &overrides).unwrap_err().exit_code(), 2);
+    }
+    let missing = Overrides { environment: Some("none.exr".into()), ..Overrides::default() };
+    assert_eq!(Scene::load(None, &missing).unwrap_err().to_string(), "none.exr: cannot read");
+}
+
+#[test]
+fn files_that_are_no_scene_are_refused() {
+    let folder = Folder::new();
+    folder.write("scene.txt", "");
+    folder.write("latin.toml", b"# caf\n# \xe9\n");
+    folder.write("model.glb", "glTF");
+    folder.write("broken.toml", "[camera]\nposition = [0, 0\n\n[render]\n");
+    fs::create_dir(folder.path("folder.toml")).unwrap();
+    for (name, expected) in [
+        ("scene.txt", "scene.txt: is no scene of a known kind; known: .toml (scene), .obj (mesh)"),
+        ("latin.toml", "latin.toml:2: is not UTF-8 text; save it as UTF-8"),
+        ("model.glb", "glTF is not read yet; convert to .obj"),
+        ("model.gltf", "glTF is not read yet; convert to .obj"),
+        ("none.toml", "none.toml: cannot read"),
+        ("folder.toml", "folder.toml: is a folder; name a file"),
+        ("broken.toml", "broken.toml:4: "),
+    ] {
+        let error = folder.load(name).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+        assert_eq!(error.exit_code(), 2);
+    }
+    assert!(folder.fault("[[object]]\nmesh = \"model.glb\"").contains("glTF is not read yet"));
+    assert_eq!(folder.fault("a = 1\na = 2").split(':').next(), Some("2"));
+}
+
+#[test]
+fn a_bare_mesh_is_clear_glass_in_view() {
+    let folder = Folder::new();
+    folder.write("red.mtl", "newmtl red\nKd 1 0 0\n");
+    folder.write("red.obj", format!("mtllib red.mtl\nusemtl red\n{TETRAHEDRON}"));
+    let scene = folder.load("red.obj").unwrap();
+    assert_eq!(dielectric(&scene, 0), &Dielectric::default());
+    assert!(scene.warnings.iter().any(|warning| warning.ends_with("shown as clear glass, not with its 1 materials")));
+    assert!(scene.camera.position.z > 1.0 && scene.camera.position.y > scene.camera.target.y);
+}
+
+#[test]
+fn objects_that_reach_too_far_are_refused() {
+    let folder = Folder::new();
+    let fault = folder.fault("\n[[object]]\nmesh = \"body.obj\"\nscale = 1e9\ntranslate = [1e9, 0, 0]\n");
+    assert_eq!(fault, "2: the object reaches 2.0e9 m; at most 1e9 m can be rendered, scale it down");
+    folder.write("far.obj", TETRAHEDRON.replace("v 1 0 0", "v 1e30 0 0"));
+    let fault = folder.fault("[[object]]\nmesh = \"far.obj\"");
+    assert_eq!(fault, "far.obj:2: vertex coordinate 1e30: coordinates must be finite and not beyond 1e9");
+}
+
+#[test]
+fn what_is_wrong_with_a_mesh_is_told_with_counts() {
+    let folder = Folder::new();
+    let load = |text: String| {
+        folder.write("mesh.obj", text);
+        folder.load("mesh.obj")
+    };
+    let open = load(TETRAHEDRON.replace("f 2 3 4\n", "f 2 2 3\n")).unwrap();
+    let expected =
+        "mesh.obj: 3 open edges, 1 degenerate triangle removed; the surface is not closed, so it bounds no medium";
+    assert_eq!(open.warnings[0], expected);
+    let inverted = load(
+        TETRAHEDRON
+            .replace("f 1 3 2", "f 1 2 3")
+            .replace("f 1 2 4", "f 1 4 2")
+            .replace("f 1 4 3", "f 1 3 4")
+            .replace("f 2 3 4", "f 2 4 3"),
+    );
+    assert_eq!(inverted.unwrap().warnings[0], "mesh.obj: 1 shell inside out");
+    for (text, expected) in [
+        (TETRAHEDRON.replace("v 0 1 0", "v 0 nan 0"), "mesh.obj:3: vertex coordinate nan: coordinates must be finite"),
+        (TETRAHEDRON.replace("v 0 1 0", "v 0 1e39 inf"), "mesh.obj:3: vertex coordinate 1e39"),
+        (TETRAHEDRON.replace("v 0 1 0", "v 0 one 0"), "mesh.obj:3: \"one\" is no number; expected v X Y Z"),
+        (
+            TETRAHEDRON.replace("f 2 3 4", "f 2 3 5"),
+            "mesh.obj:8: a face names vertex 5, which does not exist (the file has 4)",
+        ),
+        (TETRAHEDRON.replace('f', "#"), "mesh.obj: holds no triangles; export faces, not only points"),
+        (String::new(), "mesh.obj: holds no triangles"),
+        ("v 0 0 0\nf 1 1 1\n".into(), "mesh.obj: holds no triangles but 1 without an area"),
+        ("\0\u{1}\u{2}junk".into(), "mesh.obj: is binary, not Wavefront OBJ text"),
+    ] {
+        let error = load(text).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn normals_are_kept_mended_or_dropped() {
+    let folder = Folder::new();
+    let load = |faces: &str| {
+        folder.write("mesh.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 5\nvn 0 0 0\nvn nan 0 0\n{faces}\n"));
+        folder.load("mesh.obj").unwrap()
+    };
+    let scene = load("f 1//1 2//2 3");
+    assert_eq!(scene.meshes[0].normals, [[0.0, 0.0, 1.0]; 3]);
+    assert!(scene.warnings[0].contains("2 normals replaced"), "{:?}", scene.warnings);
+    assert_eq!(load("f 1//3 2//1 3//2").meshes[0].normals, [[0.0, 0.0, 1.0]; 3]);
+    assert!(load("f 1 2 3").meshes[0].normals.is_empty());
+    assert!(load("f 1//2 2//3 3").meshes[0].normals.is_empty());
+}
+
+#[test]
+fn polygons_groups_and_materials_become_triangles_and_parts() {
+    let folder = Folder::new();
+    let quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 2 0\n";
+    folder.write("m.mtl", "newmtl red\nKd 1 0 0\nillum 1\nnewmtl clear\nillum 7\nNi 1.3\nTf 0.5 1 1\nPr 0.2\n");
+    let objects = "o one\ng a\nusemtl red\nf 1 2 3\ng b\nf 1 3 4\no two\nf 1 2 3 4 5\nusemtl clear\nf 3 4 5\nusemtl red\nf 5 4 1\n";
+    folder.write("parts.obj", format!("mtllib m.mtl\n{quad}{objects}usemtl none\nf 1 2 5\n"));
+    let scene = folder.scene("[[object]]\nmesh = \"body.obj\"\n[[object]]\nmesh = \"parts.obj\"\n").unwrap();
+    let names: Vec<_> = scene.meshes.iter().map(|mesh| (mesh.name.as_str(), mesh.triangles.len())).collect();
+    let expected = [
+        ("body.obj", 4),
+        ("parts.obj (one)", 2),
+        ("parts.obj (two)", 4),
+        ("parts.obj (two)", 1),
+        ("parts.obj (two)", 1),
+    ];
+    assert_eq!(names, expected);
+    assert_eq!(scene.objects.iter().map(|object| object.number).collect::<Vec<_>>(), [0, 1, 1, 1, 1]);
+    assert_eq!(opaque(&scene, 1), &Opaque { base_color: DVec3::X, specular: 0.0, ..Opaque::default() });
+    let clear = dielectric(&scene, 3);
+    assert!((clear.ior - 1.3).abs() < 1e-6 && (clear.roughness - 0.2).abs() < 1e-6);
+    assert_eq!((clear.attenuation_color, clear.attenuation_distance), (DVec3::new(0.5, 1.0, 1.0), 1.0));
+    assert_eq!(dielectric(&scene, 4), &Dielectric::default());
+    assert_eq!(scene.objects[0].material, scene.objects[4].material, "one clear glass is enough");
+    assert!(
+        scene.warnings.iter().any(|w| w.ends_with("material \"none\" is in no MTL file that was read")),
+        "{:?}",
+        scene.warnings
+    );
+}
+
+/// What the MTL with these lines makes of a body, and what is said about it.
+fn from_mtl(folder: &Folder, lines: &str) -> (Surface, Vec<String>) {
+    folder.write("m.mtl", format!("newmtl m\n{lines}\n"));
+    folder.write("mtl.obj", format!("mtllib m.mtl\nusemtl m\n{TETRAHEDRON}"));
+    let scene = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"mtl.obj\"\n").unwrap();
+    (scene.materials[scene.objects[0].material].surface.clone(), scene.warnings)
+}
+
+#[test]
+fn mtl_tells_glass_from_opaque_surfaces() {
+    let folder = Folder::new();
+    let glass = |lines: &str| matches!(from_mtl(&folder, lines).0, Surface::Dielectric(_));
+    for lines in
+        ["illum 4", "illum 6", "illum 7\nd 1", "illum 9", "d 0.5", "d -halo 0.5", "Tr 0.5", "Ni 1.4", "illum 2\nd 0.1"]
+    {
+        assert!(glass(lines), "{lines}");
+    }
+    for lines in [
+        "",
+        "illum 2",
+        "illum 2\nNi 1.45\nd 1.0",
+        "Ni 1.45\nd 1",
+        "Ni 1",
+        "Ni 0",
+        "Kd 1 1 1",
+        "Tr 0",
+        "illum 3\nNi 1.5",
+    ] {
+        assert!(!glass(lines), "{lines}");
+    }
+}
+
+#[test]
+fn mtl_values_are_converted_or_remarked_on() {
+    let folder = Folder::new();
+    let ior = |lines: &str| match from_mtl(&folder, &format!("illum 7\n{lines}")) {
+        (Surface::Dielectric(glass), warnings) => (glass.ior, warnings.len()),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(ior(""), (1.5, 0));
+    assert_eq!(ior("Ni 0"), (1.5, 0));
+    assert_eq!(ior("Ni 1"), (1.0, 0));
+    assert_eq!(ior("Ni -2"), (0.001, 1));
+    assert_eq!(ior("Ni inf"), (10.0, 1));
+    assert_eq!(ior("Ni nan"), (1.5, 1));
+    assert_eq!(ior("Tf 0 0 0"), (1.5, 1));
+
+    fs::create_dir(folder.path("tex")).unwrap();
+    fs::copy(folder.path("sky.png"), folder.path("tex/my sky.png")).unwrap();
+    let (surface, warnings) =
+        from_mtl(&folder, "Kd 0.5\nPm 1\nPr 0.25\nKe 1 2 3\nmap_Kd -s 1 1 1 -clamp on tex\\my sky.png");
+    let texture = folder.0.path().join("tex/my sky.png");
+    let expected = Opaque {
+        base_color: DVec3::splat(0.5),
+        base_color_texture: Some(texture),
+        metallic: 1.0,
+        roughness: 0.25,
+        specular: 1.0,
+        emission: DVec3::new(1.0, 2.0, 3.0),
+    };
+    assert_eq!((surface, warnings.len()), (Surface::Opaque(expected), 0));
+
+    let (surface, warnings) = from_mtl(&folder, "Kd 0 1 0\nmap_Kd none.png");
+    assert!(
+        matches!(surface, Surface::Opaque(opaque) if opaque.base_color == DVec3::Y && opaque.base_color_texture.is_none())
+    );
+    assert!(warnings[0].ends_with("none.png\" does not exist; the colour is used"), "{warnings:?}");
+
+    // Lines that would make tobj panic or give up.
+    let (surface, warnings) =
+        from_mtl(&folder, "Kd 1 0\nKs\nKd spectral a.rfl\nillum 300\nNi\nd\nmap_Kd\nnewmtl\nKd 0 0 1");
+    assert!(matches!(surface, Surface::Opaque(opaque) if opaque.base_color == DVec3::Z));
+    assert!(warnings[0].ends_with("m.mtl: 8 lines not understood and left out, the first is line 2"), "{warnings:?}");
+    let (surface, warnings) = from_mtl(&folder, "Kd 2 -1 nan");
+    assert!(matches!(surface, Surface::Opaque(opaque) if opaque.base_color == DVec3::X));
+    assert_eq!(warnings.len(), 3);
+}
+
+#[test]
+fn a_missing_mtl_is_a_warning_to_those_who_need_it() {
+    let folder = Folder::new();
+    folder.write("body.obj", format!("mtllib no such.mtl\nmtllib no such.mtl\nusemtl m\n{TETRAHEDRON}"));
+    let own = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"body.obj\"\n").unwrap();
+    assert_eq!(dielectric(&own, 0), &Dielectric::default());
+    assert!(own.warnings[0].contains("cannot read") && own.warnings[0].contains("clear glass"), "{:?}", own.warnings);
+    let named = folder.material("dielectric", "").unwrap();
+    assert!(!named.warnings.iter().any(|warning| warning.contains("mtl")), "{:?}", named.warnings);
+}
+
+#[test]
+fn several_mtl_files_may_stand_on_a_line_or_have_spaces() {
+    let folder = Folder::new();
+    folder.write("a.mtl", "newmtl a\nKd 1 0 0\n");
+    folder.write("b c.mtl", "newmtl b\nKd 0 1 0\n");
+    folder.write("d.mtl", "newmtl d\nKd 0 0 1\n");
+    let faces = "usemtl a\nf 1 3 2\nusemtl b\nf 1 2 4\nusemtl d\nf 1 4 3\nf 2 3 4\n";
+    let vertices = &TETRAHEDRON[..TETRAHEDRON.find('f').unwrap()];
+    folder.write("body.obj", format!("mtllib a.mtl d.mtl\n{vertices}{faces}mtllib b c.mtl\n"));
+    let scene = folder.scene("[[object]]\nmesh = \"body.obj\"\n").unwrap();
+    let colors: Vec<_> = (0..3).map(|part| opaque(&scene, part).base_color).collect();
+    assert_eq!(colors, [DVec3::X, DVec3::Y, DVec3::Z]);
+}
+
+#[test]
+fn a_latin_1_comment_is_no_reason_to_refuse_a_mesh() {
+    let folder = Folder::new();
+    folder.write("body.obj", [b"# caf\xe9\n", TETRAHEDRON.as_bytes()].concat());
+    assert_eq!(folder.load("body.obj").unwrap().meshes[0].triangles.len(), 4);
+}
+
+#[test]
+fn the_built_in_scene_is_the_one_in_assets() {
+    let assets = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets");
+    let built_in = Scene::load(None, &Overrides::default()).unwrap();
+    let file = Scene::load(Some(&assets.join("scenes/teapot.toml")), &Overrides::default()).unwrap();
+    assert_eq!(built_in.name, "built-in");
+    assert_eq!((built_in.objects.len(), built_in.meshes.len()), (4, 4));
+    assert_eq!(built_in.bounds(), file.bounds());
+    assert_eq!((built_in.camera, &built_in.materials), (file.camera, &file.materials));
+    for (a, b) in built_in.meshes.iter().zip(&file.meshes) {
+        assert_eq!((&a.positions, &a.normals, &a.triangles), (&b.positions, &b.normals, &b.triangles));
+        assert!(a.faults.is_empty(), "{}: {}", a.name, a.faults);
+        assert!(!a.normals.is_empty());
+    }
+    let (Surroundings::Image(a), Surroundings::Image(b)) = (&built_in.environment.light, &file.environment.light)
+    else {
+        panic!()
+    };
+    assert_eq!(a.texels, b.texels);
+    // The report's unit is 10 cm, ours metres.
+    assert!((built_in.bounds().unwrap().extent().x - 0.3158).abs() < 1e-3);
+}
+
+#[test]
+fn every_scene_in_assets_is_sound() {
+    let scenes = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes");
+    let mut count = 0;
+    for entry in fs::read_dir(scenes).unwrap() {
+        let scene = Scene::load(Some(&entry.unwrap().path()), &Overrides::default()).unwrap();
+        let faulty = |mesh: &&vitrum::scene::Mesh| !mesh.faults.is_empty();
+        assert!(scene.meshes.iter().find(faulty).is_none(), "{}", scene.name);
+        count += 1;
+    }
+    assert!(count >= 5);
+}
