@@ -184,7 +184,7 @@ fn fuzz(name: &str, mut make: impl FnMut(&mut Random) -> Vec<u8>, mut case: impl
         "{name}: {cases} cases, {good} of them read, the slowest took {slowest:?}, at most {} KiB held",
         peak_kib()
     );
-    assert!(peak_kib() < LARGEST_KIB);
+    assert!(peak_kib() < LARGEST_KIB, "{name}, or a test beside it, held {} KiB", peak_kib());
     assert!(good > 0, "{name}: no mutation was read, so none got far");
 }
 

@@ -71,6 +71,10 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<FloatImage, Unreadable> {
         }
         let samples = header.channels.list.len();
         check_size(header.layer_size.width(), header.layer_size.height(), samples * 4, bytes.len())?;
+        // What the `exr` crate allocates for a compressed block, before it knows that the file holds one.
+        let (columns, rows) = block_size(header);
+        check_size(columns, rows, samples * 4, bytes.len())
+            .map_err(|Unreadable(why)| Unreadable(format!("blocks of {why}")))?;
         let display = header.shared_attributes.display_window.size;
         check_size(display.width(), display.height(), 1, bytes.len())?;
     }
@@ -117,6 +121,14 @@ pub fn decode(bytes: &[u8]) -> std::result::Result<FloatImage, Unreadable> {
     Ok(place(layer.size, layer.channel_data.pixels.1, layer.attributes.layer_position))
 }
 
+/// Columns and rows of a block that is compressed as one, parts outside of the image included.
+fn block_size(header: &Header) -> (usize, usize) {
+    match header.blocks {
+        BlockDescription::ScanLines => (header.layer_size.width(), header.compression.scan_lines_per_block()),
+        BlockDescription::Tiles(tiles) => (tiles.tile_size.width(), tiles.tile_size.height()),
+    }
+}
+
 fn is_dwa(compression: Compression) -> bool {
     matches!(compression, Compression::DWAA(_) | Compression::DWAB(_))
 }
@@ -134,10 +146,7 @@ fn check_dwa_chunks(bytes: &[u8]) -> std::result::Result<(), Unreadable> {
             CompressedBlock::Tile(block) => &block.compressed_pixels_le,
             _ => continue,
         };
-        let (columns, rows) = match header.blocks {
-            BlockDescription::ScanLines => (header.layer_size.width(), header.compression.scan_lines_per_block()),
-            BlockDescription::Tiles(tiles) => (tiles.tile_size.width(), tiles.tile_size.height()),
-        };
+        let (columns, rows) = block_size(header);
         // 8x8 blocks reach over the edges; twice four bytes a sample, as each section has overhead of its own.
         let side = |pixels: usize, whole: usize| pixels.min(whole) + 8;
         let area = side(columns, header.layer_size.width()) * side(rows, header.layer_size.height());
@@ -288,12 +297,46 @@ mod tests {
         assert_eq!(decode(bytes.get_ref()).unwrap_err().0, "holds neither R, G and B nor Y but the channels A, X, Z");
     }
 
+    /// Where the value of the attribute with this name and type starts.
+    fn value_of(file: &[u8], name_and_type: &[u8]) -> usize {
+        file.windows(name_and_type.len()).position(|window| window == name_and_type).unwrap() + name_and_type.len() + 4
+    }
+
+    #[test]
+    fn blocks_that_claim_too_much_are_refused() {
+        let channels = AnyChannels::sort(
+            ["B", "G", "R"]
+                .map(|name| AnyChannel::new(name, FlatSamples::F16(vec![f16::ONE; 64])))
+                .into_iter()
+                .collect(),
+        );
+        for (compression, tamper, expected) in [
+            (Compression::RLE, "tile", "blocks of 8x1056964616 pixels; sides up to 16384 are read"),
+            (Compression::DWAA(None), "chunk", "a DWA chunk claims more data than it has pixels"),
+        ] {
+            let encoding =
+                Encoding { compression, blocks: Blocks::Tiles(Vec2(8, 8)), line_order: LineOrder::Increasing };
+            let layer = exr::image::Layer::new((8, 8), LayerAttributes::default(), encoding, channels.clone());
+            let mut bytes = Cursor::new(Vec::new());
+            exr::image::Image::from_layer(layer).write().to_buffered(&mut bytes).unwrap();
+            let mut bytes = bytes.into_inner();
+            assert_eq!(decode(&bytes).unwrap().pixels.len(), 64);
+            let at = match tamper {
+                "tile" => value_of(&bytes, b"tiles\0tiledesc\0") + 7,
+                // The version, 2, is the first of a chunk's counters; the next one is a size.
+                _ => bytes.windows(8).position(|window| window == 2_u64.to_le_bytes()).unwrap() + 15,
+            };
+            bytes[at] = 0x3f;
+            let Unreadable(message) = decode(&bytes).unwrap_err();
+            assert!(message.contains(expected), "{message}");
+        }
+    }
+
     #[test]
     fn a_header_that_lies_about_the_size_is_refused() {
         let mut bytes =
             encode(&FloatImage { width: 1, height: 1, pixels: vec![[1.0; 3]], layers: vec![] }, &[]).unwrap();
-        let name = b"dataWindow\0box2i\0";
-        let at = bytes.windows(name.len()).position(|window| window == name).unwrap() + name.len() + 4;
+        let at = value_of(&bytes, b"dataWindow\0box2i\0");
         for (width, height, expected) in [
             (20000_i32, 1_i32, "20000x1 pixels; sides up to 16384 are read"),
             (16000, 16000, ""),

@@ -135,7 +135,11 @@ impl Reader<'_> {
         if self.files.exists(&path) {
             return Ok(path);
         }
-        let why = if path.is_dir() { "is a folder, not a file" } else { "does not exist" };
+        let why = match path.metadata() {
+            Ok(metadata) if metadata.is_dir() => "is a folder, not a file",
+            Ok(_) => "is no regular file",
+            Err(_) => "does not exist",
+        };
         Err(entry.error(format!("{}: {:?} {why}", entry.key, path.display().to_string())))
     }
 

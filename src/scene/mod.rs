@@ -77,7 +77,8 @@ pub struct Object {
     pub material: usize,
     /// The number of the object in the scene file, from 0: the parts of one mesh file share it.
     pub number: usize,
-    /// From the mesh's space to the world.
+    /// From the mesh's space to the world. A negative determinant mirrors: the outside is then where triangles show their
+    /// clockwise side.
     pub transform: DAffine3,
     /// Normals are interpolated; false, or a mesh without normals: those of the faces.
     pub smooth: bool,

@@ -13,12 +13,14 @@
 //! range with a remark: an MTL file is a by-product, and many are careless. `tobj` reads a text without such lines,
 //! because it gives up on them or panics.
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 
 use super::files::Files;
 use super::material::{Dielectric, Material, Opaque, Surface};
+use super::obj::shorten;
 
 /// Metres over which `Tf` is taken to act.
 const FILTER_DISTANCE: f64 = 1.0;
@@ -26,7 +28,7 @@ const FILTER_DISTANCE: f64 = 1.0;
 /// The materials of the `libraries` that the `.obj` at `obj` names. What cannot be read is a remark.
 pub fn read_all(files: Files, obj: &Path, libraries: &[String], remarks: &mut Vec<String>) -> Vec<Material> {
     let folder = obj.parent().unwrap_or(Path::new(""));
-    let mut done: Vec<PathBuf> = Vec::new();
+    let mut done = HashSet::new();
     let mut materials = Vec::new();
     for library in libraries {
         // A line names one file, perhaps with spaces in its name, or several.
@@ -36,10 +38,10 @@ pub fn read_all(files: Files, obj: &Path, libraries: &[String], remarks: &mut Ve
             false => library.split_whitespace().map(|name| folder.join(name)).collect(),
         };
         for path in paths {
-            let identity = files.identity(&path);
-            if !done.contains(&identity) {
-                done.push(identity);
+            if done.insert(files.identity(&path)) {
+                let before = remarks.len();
                 materials.extend(read(files, &path, remarks));
+                shorten(remarks, before, "remarks on this file's materials");
             }
         }
     }

@@ -49,9 +49,11 @@ pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
     let materials = mtl::read_all(files, path, &tidy.libraries, &mut material_warnings);
     // As in an MTL file, the last one of a name counts.
     let numbers: HashMap<&str, usize> = materials.iter().enumerate().map(|(i, m)| (m.name.as_str(), i)).collect();
+    let before = material_warnings.len();
     for unknown in tidy.materials.iter().filter(|name| !numbers.contains_key(name.as_str())) {
         material_warnings.push(format!("{}: material {unknown:?} is in no MTL file that was read", path.display()));
     }
+    shorten(&mut material_warnings, before, "materials are in none");
 
     let names_only = |_: &Path| {
         let numbers = numbers.iter().map(|(name, number)| (name.to_string(), *number)).collect();
@@ -100,6 +102,7 @@ fn parts(
         part.triangles.extend(triangles.map(|triangle| triangle.map(|vertex| vertex + offset)));
     }
     let several = raw.len() > 1;
+    let before = warnings.len();
     let mut parts = Vec::new();
     let mut lost = 0;
     for RawPart { name, material, positions, normals, triangles } in raw {
@@ -118,6 +121,7 @@ fn parts(
             }
         }
     }
+    shorten(warnings, before, "parts have faults");
     if parts.is_empty() {
         return Err(Error::input(path, 0, Refusal::NoTriangles { degenerate: lost }.to_string()));
     }
@@ -125,4 +129,29 @@ fn parts(
         warnings.push(format!("{file}: {lost} degenerate triangles removed, and the parts that held nothing else"));
     }
     Ok(parts)
+}
+
+/// Keeps the first of the remarks from `start` on, and says how many more of `what` there are.
+pub fn shorten(remarks: &mut Vec<String>, start: usize, what: &str) {
+    const MOST: usize = 8;
+    let more = remarks.len().saturating_sub(start + MOST);
+    if more > 0 {
+        remarks.truncate(start + MOST);
+        remarks.push(format!("... {more} more {what}"));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn many_remarks_become_a_few() {
+        let mut remarks: Vec<_> = (0..10).map(|number| format!("fault {number}")).collect();
+        shorten(&mut remarks, 2, "faults");
+        assert_eq!((remarks.len(), remarks[9].as_str()), (10, "fault 9"));
+        remarks.push("fault 10".into());
+        shorten(&mut remarks, 2, "faults");
+        assert_eq!((remarks.len(), remarks[10].as_str()), (11, "... 1 more faults"));
+    }
 }

@@ -6,6 +6,7 @@
 //! corners without a normal get one of zero, which [`super::mesh`] replaces.
 
 use std::borrow::Cow;
+use std::collections::HashSet;
 use std::fmt::Write;
 
 use super::mesh::FARTHEST;
@@ -81,6 +82,7 @@ impl Tidy {
         let mut counts = [0; 3];
         let mut used = vec![false; totals[0]];
         let (mut slivers, mut wires, mut free_form, mut unknown) = (0, 0, 0, Vec::new());
+        let (mut libraries, mut materials) = (HashSet::new(), HashSet::new());
         let mut out_of_range: Vec<Fault> = Vec::new();
         for (number, line) in lines(text) {
             let (keyword, rest) = split_keyword(&line);
@@ -106,9 +108,9 @@ impl Tidy {
                 "o" => self.name("o", rest),
                 "usemtl" => {
                     self.name("usemtl", rest);
-                    remember(&mut self.materials, rest);
+                    remember(&mut materials, &mut self.materials, rest);
                 }
-                "mtllib" => remember(&mut self.libraries, rest),
+                "mtllib" => remember(&mut libraries, &mut self.libraries, rest),
                 "l" | "p" => wires += 1,
                 "" => {}
                 comment if comment.starts_with('#') => {}
@@ -179,8 +181,9 @@ fn push_index(out: &mut String, text: &str, index: usize) {
     }
 }
 
-fn remember(names: &mut Vec<String>, name: &str) {
-    if !name.is_empty() && !names.iter().any(|known| known == name) {
+fn remember(known: &mut HashSet<String>, names: &mut Vec<String>, name: &str) {
+    if !name.is_empty() && !known.contains(name) {
+        known.insert(name.to_owned());
         names.push(name.to_owned());
     }
 }

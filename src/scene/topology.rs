@@ -8,7 +8,11 @@ use super::Bounds;
 use super::mesh::MeshFaults;
 
 /// How many triangles may be visited to find out which shell holds which; beyond that bounding boxes decide.
-const WINDING_BUDGET: usize = 50_000_000;
+const WINDING_BUDGET: usize = 10_000_000;
+
+/// How many pairs of a shell turned inwards and one turned outwards may be compared; beyond that, a fraction of a
+/// second, all that are turned inwards count as inside out.
+const MOST_PAIRS: usize = 100_000_000;
 
 /// A welded, connected piece of a surface.
 struct Shell {
@@ -123,26 +127,23 @@ fn shells(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, faulty: &[u32]) -> V
 
 /// Closed shells whose inside lies outside: negative volume, and not a cavity of a shell around them.
 fn inverted_shells(shells: &[Shell], positions: &[[f32; 3]]) -> usize {
-    let mut budget = WINDING_BUDGET;
     let flat = |shell: &Shell| -1e-9 * shell.bounds.extent().max_element().powi(3);
-    let inside_out = shells.iter().enumerate().filter(|(_, shell)| shell.closed && shell.volume < flat(shell));
-    let is_inverted = |&(index, shell): &(usize, &Shell)| {
+    let inside_out: Vec<_> = shells.iter().filter(|shell| shell.closed && shell.volume < flat(shell)).collect();
+    let solids: Vec<_> = shells.iter().filter(|shell| shell.closed && shell.volume > 0.0).collect();
+    if inside_out.len() * solids.len() > MOST_PAIRS {
+        return inside_out.len();
+    }
+    let mut budget = WINDING_BUDGET;
+    let mut is_cavity = |shell: &Shell| {
         let point = place(positions, shell.triangles[0][0]);
-        let around = shells.iter().enumerate().filter(|&(other, around)| {
-            other != index && around.closed && around.volume > 0.0 && around.bounds.contains(point)
+        let around = solids.iter().filter(|solid| solid.bounds.contains(point));
+        let winding = around.map(|solid| {
+            budget = budget.saturating_sub(solid.triangles.len());
+            if budget > 0 { winding_number(solid, positions, point) } else { 1.0 }
         });
-        let winding: f64 = around
-            .map(|(_, around)| match budget.checked_sub(around.triangles.len()) {
-                Some(left) => {
-                    budget = left;
-                    winding_number(around, positions, point)
-                }
-                None => 1.0,
-            })
-            .sum();
-        winding < 0.5
+        winding.sum::<f64>() > 0.5
     };
-    inside_out.filter(is_inverted).count()
+    inside_out.iter().filter(|shell| !is_cavity(shell)).count()
 }
 
 /// How often `shell` winds around `point`: the sum of its triangles' solid angles over 4 pi, after Van Oosterom and

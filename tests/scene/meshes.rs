@@ -1,0 +1,201 @@
+//! OBJ and MTL files.
+
+use std::fs;
+
+use glam::DVec3;
+use vitrum::scene::{Dielectric, Opaque, Surface};
+
+use super::{Folder, TETRAHEDRON, dielectric, opaque};
+
+#[test]
+fn what_is_wrong_with_a_mesh_is_told_with_counts() {
+    let folder = Folder::new();
+    let load = |text: String| {
+        folder.write("mesh.obj", text);
+        folder.load("mesh.obj")
+    };
+    let open = load(TETRAHEDRON.replace("f 2 3 4\n", "f 2 2 3\n")).unwrap();
+    let expected =
+        "mesh.obj: 3 open edges, 1 degenerate triangle removed; the surface is not closed, so it bounds no medium";
+    assert_eq!(open.warnings[0], expected);
+    let inverted = load(
+        TETRAHEDRON
+            .replace("f 1 3 2", "f 1 2 3")
+            .replace("f 1 2 4", "f 1 4 2")
+            .replace("f 1 4 3", "f 1 3 4")
+            .replace("f 2 3 4", "f 2 4 3"),
+    );
+    assert_eq!(inverted.unwrap().warnings[0], "mesh.obj: 1 shell inside out");
+    for (text, expected) in [
+        (TETRAHEDRON.replace("v 0 1 0", "v 0 nan 0"), "mesh.obj:3: vertex coordinate nan: coordinates must be finite"),
+        (TETRAHEDRON.replace("v 0 1 0", "v 0 1e39 inf"), "mesh.obj:3: vertex coordinate 1e39"),
+        (TETRAHEDRON.replace("v 0 1 0", "v 0 one 0"), "mesh.obj:3: \"one\" is no number; expected v X Y Z"),
+        (
+            TETRAHEDRON.replace("f 2 3 4", "f 2 3 5"),
+            "mesh.obj:8: a face names vertex 5, which does not exist (the file has 4)",
+        ),
+        (TETRAHEDRON.replace('f', "#"), "mesh.obj: holds no triangles; export faces, not only points"),
+        (String::new(), "mesh.obj: holds no triangles"),
+        ("v 0 0 0\nf 1 1 1\n".into(), "mesh.obj: holds no triangles but 1 without an area"),
+        ("\0\u{1}\u{2}junk".into(), "mesh.obj: is binary, not Wavefront OBJ text"),
+    ] {
+        let error = load(text).unwrap_err();
+        assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn normals_are_kept_mended_or_dropped() {
+    let folder = Folder::new();
+    let load = |faces: &str| {
+        folder.write("mesh.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 5\nvn 0 0 0\nvn nan 0 0\n{faces}\n"));
+        folder.load("mesh.obj").unwrap()
+    };
+    let scene = load("f 1//1 2//2 3");
+    assert_eq!(scene.meshes[0].normals, [[0.0, 0.0, 1.0]; 3]);
+    assert!(scene.warnings[0].contains("2 normals replaced"), "{:?}", scene.warnings);
+    assert_eq!(load("f 1//3 2//1 3//2").meshes[0].normals, [[0.0, 0.0, 1.0]; 3]);
+    assert!(load("f 1 2 3").meshes[0].normals.is_empty());
+    assert!(load("f 1//2 2//3 3").meshes[0].normals.is_empty());
+}
+
+#[test]
+fn polygons_groups_and_materials_become_triangles_and_parts() {
+    let folder = Folder::new();
+    let quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 2 0\n";
+    folder.write("m.mtl", "newmtl red\nKd 1 0 0\nillum 1\nnewmtl clear\nillum 7\nNi 1.3\nTf 0.5 1 1\nPr 0.2\n");
+    let objects = "o one\ng a\nusemtl red\nf 1 2 3\ng b\nf 1 3 4\no two\nf 1 2 3 4 5\nusemtl clear\nf 3 4 5\nusemtl red\nf 5 4 1\n";
+    folder.write("parts.obj", format!("mtllib m.mtl\n{quad}{objects}usemtl none\nf 1 2 5\n"));
+    let scene = folder.scene("[[object]]\nmesh = \"body.obj\"\n[[object]]\nmesh = \"parts.obj\"\n").unwrap();
+    let names: Vec<_> = scene.meshes.iter().map(|mesh| (mesh.name.as_str(), mesh.triangles.len())).collect();
+    let expected = [
+        ("body.obj", 4),
+        ("parts.obj (one)", 2),
+        ("parts.obj (two)", 4),
+        ("parts.obj (two)", 1),
+        ("parts.obj (two)", 1),
+    ];
+    assert_eq!(names, expected);
+    assert_eq!(scene.objects.iter().map(|object| object.number).collect::<Vec<_>>(), [0, 1, 1, 1, 1]);
+    assert_eq!(opaque(&scene, 1), &Opaque { base_color: DVec3::X, specular: 0.0, ..Opaque::default() });
+    let clear = dielectric(&scene, 3);
+    assert!((clear.ior - 1.3).abs() < 1e-6 && (clear.roughness - 0.2).abs() < 1e-6);
+    assert_eq!((clear.attenuation_color, clear.attenuation_distance), (DVec3::new(0.5, 1.0, 1.0), 1.0));
+    assert_eq!(dielectric(&scene, 4), &Dielectric::default());
+    assert_eq!(scene.objects[0].material, scene.objects[4].material, "one clear glass is enough");
+    assert!(
+        scene.warnings.iter().any(|w| w.ends_with("material \"none\" is in no MTL file that was read")),
+        "{:?}",
+        scene.warnings
+    );
+}
+
+/// What the MTL with these lines makes of a body, and what is said about it.
+fn from_mtl(folder: &Folder, lines: &str) -> (Surface, Vec<String>) {
+    folder.write("m.mtl", format!("newmtl m\n{lines}\n"));
+    folder.write("mtl.obj", format!("mtllib m.mtl\nusemtl m\n{TETRAHEDRON}"));
+    let scene = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"mtl.obj\"\n").unwrap();
+    (scene.materials[scene.objects[0].material].surface.clone(), scene.warnings)
+}
+
+#[test]
+fn mtl_tells_glass_from_opaque_surfaces() {
+    let folder = Folder::new();
+    let glass = |lines: &str| matches!(from_mtl(&folder, lines).0, Surface::Dielectric(_));
+    for lines in
+        ["illum 4", "illum 6", "illum 7\nd 1", "illum 9", "d 0.5", "d -halo 0.5", "Tr 0.5", "Ni 1.4", "illum 2\nd 0.1"]
+    {
+        assert!(glass(lines), "{lines}");
+    }
+    for lines in [
+        "",
+        "illum 2",
+        "illum 2\nNi 1.45\nd 1.0",
+        "Ni 1.45\nd 1",
+        "Ni 1",
+        "Ni 0",
+        "Kd 1 1 1",
+        "Tr 0",
+        "illum 3\nNi 1.5",
+    ] {
+        assert!(!glass(lines), "{lines}");
+    }
+}
+
+#[test]
+fn mtl_values_are_converted_or_remarked_on() {
+    let folder = Folder::new();
+    let ior = |lines: &str| match from_mtl(&folder, &format!("illum 7\n{lines}")) {
+        (Surface::Dielectric(glass), warnings) => (glass.ior, warnings.len()),
+        other => panic!("{other:?}"),
+    };
+    assert_eq!(ior(""), (1.5, 0));
+    assert_eq!(ior("Ni 0"), (1.5, 0));
+    assert_eq!(ior("Ni 1"), (1.0, 0));
+    assert_eq!(ior("Ni -2"), (0.001, 1));
+    assert_eq!(ior("Ni inf"), (10.0, 1));
+    assert_eq!(ior("Ni nan"), (1.5, 1));
+    assert_eq!(ior("Tf 0 0 0"), (1.5, 1));
+
+    fs::create_dir(folder.path("tex")).unwrap();
+    fs::copy(folder.path("sky.png"), folder.path("tex/my sky.png")).unwrap();
+    let (surface, warnings) =
+        from_mtl(&folder, "Kd 0.5\nPm 1\nPr 0.25\nKe 1 2 3\nmap_Kd -s 1 1 1 -clamp on tex\\my sky.png");
+    let texture = folder.0.path().join("tex/my sky.png");
+    let expected = Opaque {
+        base_color: DVec3::splat(0.5),
+        base_color_texture: Some(texture),
+        metallic: 1.0,
+        roughness: 0.25,
+        specular: 1.0,
+        emission: DVec3::new(1.0, 2.0, 3.0),
+    };
+    assert_eq!((surface, warnings.len()), (Surface::Opaque(expected), 0));
+
+    let (surface, warnings) = from_mtl(&folder, "Kd 0 1 0\nmap_Kd none.png");
+    assert!(
+        matches!(surface, Surface::Opaque(opaque) if opaque.base_color == DVec3::Y && opaque.base_color_texture.is_none())
+    );
+    assert!(warnings[0].ends_with("none.png\" does not exist; the colour is used"), "{warnings:?}");
+
+    // Lines that would make tobj panic or give up.
+    let (surface, warnings) =
+        from_mtl(&folder, "Kd 1 0\nKs\nKd spectral a.rfl\nillum 300\nNi\nd\nmap_Kd\nnewmtl\nKd 0 0 1");
+    assert!(matches!(surface, Surface::Opaque(opaque) if opaque.base_color == DVec3::Z));
+    assert!(warnings[0].ends_with("m.mtl: 8 lines not understood and left out, the first is line 2"), "{warnings:?}");
+    let (surface, warnings) = from_mtl(&folder, "Kd 2 -1 nan");
+    assert!(matches!(surface, Surface::Opaque(opaque) if opaque.base_color == DVec3::X));
+    assert_eq!(warnings.len(), 3);
+}
+
+#[test]
+fn a_missing_mtl_is_a_warning_to_those_who_need_it() {
+    let folder = Folder::new();
+    folder.write("body.obj", format!("mtllib no such.mtl\nmtllib no such.mtl\nusemtl m\n{TETRAHEDRON}"));
+    let own = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"body.obj\"\n").unwrap();
+    assert_eq!(dielectric(&own, 0), &Dielectric::default());
+    assert!(own.warnings[0].contains("cannot read") && own.warnings[0].contains("clear glass"), "{:?}", own.warnings);
+    let named = folder.material("dielectric", "").unwrap();
+    assert!(!named.warnings.iter().any(|warning| warning.contains("mtl")), "{:?}", named.warnings);
+}
+
+#[test]
+fn several_mtl_files_may_stand_on_a_line_or_have_spaces() {
+    let folder = Folder::new();
+    folder.write("a.mtl", "newmtl a\nKd 1 0 0\n");
+    folder.write("b c.mtl", "newmtl b\nKd 0 1 0\n");
+    folder.write("d.mtl", "newmtl d\nKd 0 0 1\n");
+    let faces = "usemtl a\nf 1 3 2\nusemtl b\nf 1 2 4\nusemtl d\nf 1 4 3\nf 2 3 4\n";
+    let vertices = &TETRAHEDRON[..TETRAHEDRON.find('f').unwrap()];
+    folder.write("body.obj", format!("mtllib a.mtl d.mtl\n{vertices}{faces}mtllib b c.mtl\n"));
+    let scene = folder.scene("[[object]]\nmesh = \"body.obj\"\n").unwrap();
+    let colors: Vec<_> = (0..3).map(|part| opaque(&scene, part).base_color).collect();
+    assert_eq!(colors, [DVec3::X, DVec3::Y, DVec3::Z]);
+}
+
+#[test]
+fn a_latin_1_comment_is_no_reason_to_refuse_a_mesh() {
+    let folder = Folder::new();
+    folder.write("body.obj", [b"# caf\xe9\n", TETRAHEDRON.as_bytes()].concat());
+    assert_eq!(folder.load("body.obj").unwrap().meshes[0].triangles.len(), 4);
+}
