@@ -10,19 +10,19 @@ impl Mesh {
     /// How often the surface winds around `point`, in the mesh's space: 1 inside of a closed mesh, 0 outside and in its
     /// cavities.
     pub fn winding_number(&self, point: DVec3) -> f64 {
-        let corner = |index: u32| DVec3::from_array(self.positions[index as usize].map(f64::from)) - point;
-        let angles = self.triangles.iter().map(|&[a, b, c]| solid_angle(corner(a), corner(b), corner(c)));
-        angles.sum::<f64>() / (2.0 * TAU)
+        winding_number(&self.positions, &self.triangles, point)
     }
 }
 
-/// The part of the unit sphere that a triangle covers, seen from the origin, positive where its outside is turned away:
-/// van Oosterom & Strackee 1983.
-fn solid_angle(a: DVec3, b: DVec3, c: DVec3) -> f64 {
-    let (la, lb, lc) = (a.length(), b.length(), c.length());
-    let volume = a.dot(b.cross(c));
-    let product = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-    2.0 * volume.atan2(product)
+/// The solid angles of `triangles` seen from `point`, over 4 pi: van Oosterom & Strackee 1983, equation 8.
+pub(super) fn winding_number(positions: &[[f32; 3]], triangles: &[[u32; 3]], point: DVec3) -> f64 {
+    let half_angles = triangles.iter().map(|triangle| {
+        let [a, b, c] = triangle.map(|index| DVec3::from_array(positions[index as usize].map(f64::from)) - point);
+        let (la, lb, lc) = (a.length(), b.length(), c.length());
+        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
+        a.dot(b.cross(c)).atan2(denominator)
+    });
+    half_angles.sum::<f64>() / TAU
 }
 
 impl Scene {

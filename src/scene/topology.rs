@@ -5,6 +5,7 @@
 use glam::DVec3;
 
 use super::Bounds;
+use super::containment::winding_number;
 use super::mesh::MeshFaults;
 
 /// How many triangles may be visited to find out which shell holds which; beyond that bounding boxes decide.
@@ -139,23 +140,11 @@ fn inverted_shells(shells: &[Shell], positions: &[[f32; 3]]) -> usize {
         let around = solids.iter().filter(|solid| solid.bounds.contains(point));
         let winding = around.map(|solid| {
             budget = budget.saturating_sub(solid.triangles.len());
-            if budget > 0 { winding_number(solid, positions, point) } else { 1.0 }
+            if budget > 0 { winding_number(positions, &solid.triangles, point) } else { 1.0 }
         });
         winding.sum::<f64>() > 0.5
     };
     inside_out.iter().filter(|shell| !is_cavity(shell)).count()
-}
-
-/// How often `shell` winds around `point`: the sum of its triangles' solid angles over 4 pi, after Van Oosterom and
-/// Strackee 1983, equation 8.
-fn winding_number(shell: &Shell, positions: &[[f32; 3]], point: DVec3) -> f64 {
-    let half_angles = shell.triangles.iter().map(|triangle| {
-        let [a, b, c] = triangle.map(|vertex| place(positions, vertex) - point);
-        let (la, lb, lc) = (a.length(), b.length(), c.length());
-        let denominator = la * lb * lc + a.dot(b) * lc + b.dot(c) * la + c.dot(a) * lb;
-        a.dot(b.cross(c)).atan2(denominator)
-    });
-    half_angles.sum::<f64>() / std::f64::consts::TAU
 }
 
 fn place(positions: &[[f32; 3]], vertex: u32) -> DVec3 {

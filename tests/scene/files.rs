@@ -129,7 +129,7 @@ fn a_scene_that_says_little_gets_the_defaults() {
     let scene = folder.scene("[[object]]\nmesh = \"body.obj\"\n").unwrap();
     assert_eq!(dielectric(&scene, 0), &Dielectric::default());
     assert!(matches!(&scene.environment.light, Surroundings::Image(panorama) if panorama.width == 512));
-    assert_eq!(scene.warnings, ["city.exr: repaired 158 texels (0 NaN, 0 infinite, 158 negative)"]);
+    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
     assert_eq!(scene.camera, vitrum::scene::Camera::framing(scene.bounds().unwrap()));
     let empty = folder.scene("").unwrap();
     assert!(empty.objects.is_empty() && empty.bounds().is_none());
