@@ -57,7 +57,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
 fn gpu_ms(gpu: &Gpu, scene: &Scene, samples: u32) -> Result<f64, Box<dyn std::error::Error>> {
     let size = Some(Size { width: 1024, height: 768 });
     let plan = Plan::new(scene, &RenderArgs { samples: Some(samples), size, ..RenderArgs::default() })?;
-    let rendered = render(gpu, scene, &plan, &mut |_, _| {})?;
+    let rendered = render(gpu, scene, &plan, &mut |_| {})?;
     rendered.passes.iter().map(|pass| pass.gpu_ms).sum::<Option<f64>>().ok_or_else(|| "the device has no clock".into())
 }
 

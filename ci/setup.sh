@@ -65,7 +65,7 @@ lavapipe_has_ray_query() {
 # Debian's backports suite comes from the mirror that already serves the release itself.
 enable_backports() {
     local codename=$1 mirror
-    apt-cache policy | grep -q "n=$codename-backports" && return
+    apt-cache policy | grep "n=$codename-backports" >/dev/null && return
     mirror=$(apt-get indextargets --format '$(CODENAME) $(COMPONENT) $(REPO_URI)' 'Created-By: Packages' |
         awk -v c="$codename" '$1 == c && $2 == "main" { print $3; exit }')
     [ -n "$mirror" ] || return 1

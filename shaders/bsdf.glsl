@@ -20,35 +20,50 @@ struct SurfaceData {
     float refractionIntensity;
 };
 
-// Cosine of the transmitted angle by Snell's law, report E(3); 0 where light is totally reflected.
-// The report's 1 - eta^2 (1 - cos^2) is factored so that nothing cancels at grazing angles or at an index near 1.
-float GetCosThetaTr(float cosThetaIn, float etaIOverT)
+// Cosine of the transmitted angle by Snell's law, report E(3), from 0; 0 where light is totally reflected.
+// The report's 1 - (etaI / etaT)^2 (1 - cos^2), factored so that nothing cancels at grazing angles or where the indices are
+// nearly equal.
+float GetCosThetaTr(float cosThetaIn, float etaI, float etaT)
 {
-    if (etaIOverT == 1.0) return abs(cosThetaIn); // a square root may be an ULP off, and then index 1 would show
-    precise float bent = etaIOverT * cosThetaIn;
-    precise float squared = (1.0 - etaIOverT) * (1.0 + etaIOverT) + bent * bent;
-    return sqrt(max(0.0, squared));
+    precise float bent = etaI * cosThetaIn;
+    precise float squared = (etaT - etaI) * (etaT + etaI) + bent * bent;
+    return sqrt(max(0.0, squared)) / etaT;
 }
 
-// A ratio whose denominator stays above its own rounding error: report E(4) divides by zero where the surface is seen
-// from behind at Brewster's angle. The one deviation from the report's values.
-float FresnelRatio(float minuend, float subtrahend)
-{
-    float denominator = minuend + subtrahend;
-    float least = 1.2e-7 * (abs(minuend) + abs(subtrahend));
-    return (minuend - subtrahend) / (abs(denominator) < least ? least : denominator);
-}
+// The least magnitude of a ratio of amplitudes that is inverted: the rounding error of 1.
+const float LEAST_RATIO = 1.2e-7;
 
-// Unpolarised Fresnel reflectance, report E(4). Above 1 where the cosine is negative.
+// Unpolarised Fresnel reflectance, report E(4), from 0 to 1 in front. From behind, where the cosine is negative and the
+// indices are not swapped, the report's amplitudes are those of the front, inverted: at least 1, and infinite at Brewster's angle.
+// There, the one deviation from the report's values, they stay finite. Equal indices reflect nothing, from either side.
 float FresnelBSDF(float cosThetaIn, float etaIn, float etaTr)
 {
     cosThetaIn = clamp(cosThetaIn, -1.0, 1.0);
-    float cosThetaTr = GetCosThetaTr(cosThetaIn, etaIn / etaTr);
+    if (etaIn == etaTr) return 0.0;
+    float cosThetaTr = GetCosThetaTr(cosThetaIn, etaIn, etaTr);
     if (cosThetaTr <= 0.0) return 1.0; // total internal reflection
 
-    float f0 = FresnelRatio(etaTr * cosThetaIn, etaIn * cosThetaTr);
-    float f90 = FresnelRatio(etaIn * cosThetaIn, etaTr * cosThetaTr);
+    // (a - b) / (a + b) as (a^2 - b^2) / (a + b)^2, with Snell's law put into the numerators: no difference of nearly equal
+    // numbers is left but at Brewster's angle.
+    float cosine = abs(cosThetaIn);
+    float in2 = etaIn * etaIn;
+    float tr2 = etaTr * etaTr;
+    precise float contrast = (etaTr - etaIn) * (etaTr + etaIn);
+    float parallel = etaTr * (etaTr * cosine + etaIn * cosThetaTr);
+    float perpendicular = etaIn * cosine + etaTr * cosThetaTr;
+    float f0 = contrast * ((tr2 + in2) * cosine * cosine - in2) / (parallel * parallel);
+    float f90 = -contrast / (perpendicular * perpendicular);
+    if (cosThetaIn < 0.0) {
+        f0 = 1.0 / max(abs(f0), LEAST_RATIO);
+        f90 = 1.0 / max(abs(f90), LEAST_RATIO);
+    }
     return (f0 * f0 + f90 * f90) / 2.0;
+}
+
+// The share of reflection in a mixture. From behind the reflectance is above 1; an image holds no less than no light.
+float ReflectedShare(SurfaceData data, vec3 viewDir)
+{
+    return min(FresnelBSDF(dot(viewDir, data.normal), 1.0, data.refractionIndex), 1.0);
 }
 
 // Light mirrored by the surface, report code block 4.
@@ -66,12 +81,14 @@ vec3 ComputeSpecularTransmission(SurfaceData data, vec3 viewDir)
     if (!TRANSMISSION) return vec3(0.0);
     float cosThetaIn = clamp(dot(data.normal, viewDir), -1.0, 1.0);
     float etaIOverT = 1.0 / data.refractionIndex;
-    float cosThetaTr = GetCosThetaTr(cosThetaIn, etaIOverT);
-    if (cosThetaTr <= 0.0) return vec3(0.0); // total internal reflection
-
-    // As in the original, the flip comes after the cosine: the direction is then not of unit length.
-    if (frame.flippedRatio != 0) etaIOverT = data.refractionIndex;
-    vec3 transmissionDir = etaIOverT * -viewDir + (etaIOverT * cosThetaIn - cosThetaTr) * data.normal;
+    float cosThetaTr = GetCosThetaTr(cosThetaIn, 1.0, data.refractionIndex);
+    vec3 transmissionDir = -viewDir; // nothing bends at index 1, also where rounding would
+    if (data.refractionIndex != 1.0) {
+        if (cosThetaTr <= 0.0) return vec3(0.0); // total internal reflection
+        // As in the original, the flip comes after the cosine: the direction is then not of unit length.
+        if (frame.flippedRatio != 0) etaIOverT = data.refractionIndex;
+        transmissionDir = etaIOverT * -viewDir + (etaIOverT * cosThetaIn - cosThetaTr) * data.normal;
+    }
     vec3 specularTransmission = SampleEnvironment(transmissionDir, 0.0);
     return (specularTransmission + vec3(0.0, data.refractionGreen, 0.0)) * data.refractionIntensity;
 }
@@ -79,9 +96,8 @@ vec3 ComputeSpecularTransmission(SurfaceData data, vec3 viewDir)
 // Both, interpolated by the Fresnel reflectance, report E(2) and code block 1.
 vec3 ComputeScatteredLighting(vec3 reflection, vec3 transmission, SurfaceData data, vec3 viewDir)
 {
-    float fresnel = FresnelBSDF(dot(viewDir, data.normal), 1.0, data.refractionIndex);
-    // mix(), arranged to be exact where both are equal, however large the reflectance.
-    return transmission + fresnel * (reflection - transmission);
+    // mix(), arranged to be exact where both are equal.
+    return transmission + ReflectedShare(data, viewDir) * (reflection - transmission);
 }
 
 // Distribution of microfacet normals, GGX: Walter et al. 2007, equation 33, in a form that does not overflow at small alpha.
@@ -100,7 +116,8 @@ float MaskingOverCosineGGX(float cosine, float alpha)
     return 1.0 / (cosine + sqrt(alpha * alpha + (1.0 - alpha * alpha) * cosine * cosine));
 }
 
-// Light of a point light mirrored by the surface, per unit of irradiance on a plane that faces the light.
+// Light of a point light mirrored by the surface, per unit of irradiance on a plane that faces the light. The red tint is that
+// of the environment's reflection alone.
 vec3 ComputeSpecularReflectionDirect(SurfaceData data, vec3 viewDir, vec3 lightDir)
 {
     float cosThetaView = dot(data.normal, viewDir);
@@ -110,13 +127,13 @@ vec3 ComputeSpecularReflectionDirect(SurfaceData data, vec3 viewDir, vec3 lightD
     float distribution = DistributionGGX(data.normal, normalize(viewDir + lightDir), alpha);
     // D G / (4 cos cos), its cosines cancelled against those in G.
     float specular = distribution * MaskingOverCosineGGX(cosThetaView, alpha) * MaskingOverCosineGGX(cosThetaLight, alpha);
-    return vec3((specular * cosThetaLight + data.reflectionRed) * data.reflectionIntensity);
+    return vec3(specular * cosThetaLight * data.reflectionIntensity);
 }
 
 // The reflection of a point light, interpolated with no light by the Fresnel reflectance.
 vec3 ComputeDirect(vec3 reflection, SurfaceData data, vec3 viewDir)
 {
-    return FresnelBSDF(dot(viewDir, data.normal), 1.0, data.refractionIndex) * reflection;
+    return ReflectedShare(data, viewDir) * reflection;
 }
 
 #endif

@@ -5,15 +5,15 @@
 #include "tonemap.glsl"
 
 layout(location = 0) out vec4 outColor;
-layout(set = 0, binding = 0) uniform texture2D total;
+layout(set = 0, binding = 0) uniform texture2D mean;
 
 layout(push_constant) uniform Push {
-    float scale;   // exposure, divided by the number of samples
+    float scale;   // exposure
     uint curve;
 };
 
 void main()
 {
-    vec3 radiance = texelFetch(total, ivec2(gl_FragCoord.xy), 0).rgb * scale;
+    vec3 radiance = texelFetch(mean, ivec2(gl_FragCoord.xy), 0).rgb * scale;
     outColor = vec4(EncodeSrgb(ToneCurve(radiance, curve)), 1.0);
 }

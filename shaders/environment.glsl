@@ -43,8 +43,9 @@ vec3 SampleEnvironmentImage(vec2 uv, int level)
     ivec2 high = low + 1;
     low.x = low.x < 0 ? low.x + size.x : low.x;
     high.x = high.x >= size.x ? high.x - size.x : high.x;
-    low.y = max(low.y, 0);
-    high.y = min(high.y, size.y - 1);
+    // Rows end at the poles; columns would leave the image only for a direction that is not a number.
+    low = clamp(low, ivec2(0), size - 1);
+    high = clamp(high, ivec2(0), size - 1);
     vec3 top = mix(texelFetch(environment, low, level).rgb, texelFetch(environment, ivec2(high.x, low.y), level).rgb, weight.x);
     vec3 bottom = mix(texelFetch(environment, ivec2(low.x, high.y), level).rgb, texelFetch(environment, high, level).rgb, weight.x);
     return mix(top, bottom, weight.y);

@@ -5,6 +5,9 @@
 
 #include "shared.glsl"
 
+// The least cosine between the viewer and the normal of a front.
+const float HORIZON = 1e-3;
+
 struct Hit {
     float t;        // in lengths of the ray's direction
     vec3 position;
@@ -40,7 +43,8 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction, bool fr
     vec3 p = cross(ray, edge2);
     vec3 fromCorner = instance.rayOrigin - corner;
     vec3 q = cross(fromCorner, edge1);
-    float inverse = 1.0 / dot(edge1, p);
+    float determinant = dot(edge1, p);
+    float inverse = abs(determinant) > 1e-30 ? 1.0 / determinant : 0.0; // seen exactly on edge
 
     Hit hit;
     hit.t = dot(edge2, q) * inverse;
@@ -58,7 +62,7 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction, bool fr
     // one of the face itself: it is bent to just above the horizon.
     vec3 towards = -normalize(ray);
     float cosine = dot(normal, towards);
-    if (front && cosine < 1e-4) normal += (1e-3 - cosine) * towards;
+    if (front && cosine < HORIZON) normal += (HORIZON - cosine) * towards;
     hit.normal = normalize(mat3(instance.normalToWorld) * normal);
     return hit;
 }

@@ -5,8 +5,6 @@
 use std::fmt;
 use std::str::FromStr;
 
-use serde::Deserialize;
-
 use crate::options::Model;
 use crate::scene::{Dielectric, Material, Scene, Surface};
 
@@ -174,8 +172,7 @@ impl FromIterator<Effect> for Effects {
 }
 
 /// Which effects a user wants: `auto`, `all` or names; `-name` takes one away. As given, for messages and metadata.
-#[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "String")]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Selection {
     terms: Vec<Term>,
 }
@@ -225,14 +222,6 @@ impl FromStr for Selection {
             },
         };
         Ok(Self { terms: text.split(',').map(term).collect::<Result<_, _>>()? })
-    }
-}
-
-impl TryFrom<String> for Selection {
-    type Error = String;
-
-    fn try_from(text: String) -> Result<Self, String> {
-        text.parse()
     }
 }
 

@@ -1,15 +1,16 @@
 //! The options of a render: one struct for the command line and the scene's `[render]` table, one for what they amount to.
 
+use std::ffi::{OsStr, OsString};
+use std::fmt::{self, Display};
 use std::path::PathBuf;
 use std::str::FromStr;
 
-use serde::Deserialize;
+use clap::{Args as _, FromArgMatches as _};
 
 use crate::effects::Selection;
 
 /// A light transport model: how far the light is followed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Model {
     /// The original: rasterised, one interface, reflection and refraction see the environment only
     Single,
@@ -34,12 +35,11 @@ impl Model {
 }
 
 /// The curve from scene-linear radiance to display values, for PNG only.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, clap::ValueEnum)]
 pub enum Tonemap {
     /// Clipped at 1
     None,
-    /// Khronos PBR Neutral: colours kept up to 0.8, highlights rolled off
+    /// Khronos PBR Neutral: hues kept, highlights rolled off
     #[default]
     Neutral,
     /// AgX: a filmic curve that desaturates highlights
@@ -58,8 +58,7 @@ impl Tonemap {
 }
 
 /// How rays find surfaces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
 pub enum Trace {
     /// Ray queries of the device
     Hardware,
@@ -67,9 +66,18 @@ pub enum Trace {
     Software,
 }
 
+impl Trace {
+    /// The name on the command line and in stats.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Hardware => "hardware",
+            Self::Software => "software",
+        }
+    }
+}
+
 /// An extra layer of the EXR.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum, Deserialize)]
-#[serde(rename_all = "lowercase")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Aov {
     /// Shading normal in world space
     Normal,
@@ -103,8 +111,7 @@ impl Aov {
 }
 
 /// Width and height in pixels, both from 1.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
-#[serde(try_from = "[u32; 2]")]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Size {
     /// Columns.
     pub width: u32,
@@ -139,45 +146,35 @@ impl std::fmt::Display for Size {
     }
 }
 
-/// A rule for values, used by the command line and by scene files alike.
-macro_rules! rules {
+/// Parsers of values with a range.
+macro_rules! ranges {
     ($($name:ident: $type:ty, $ok:expr, $wanted:literal;)*) => {
-        mod command_line {
+        mod range {
             $(pub fn $name(text: &str) -> Result<$type, String> {
-                let value: $type = text.parse().map_err(|_| format!("expected {}", $wanted))?;
-                super::rule::$name(value)
-            })*
-        }
-        mod rule {
-            $(pub fn $name(value: $type) -> Result<$type, String> {
+                let value: $type = text.trim().parse().map_err(|_| format!("expected {}", $wanted))?;
                 let ok: fn($type) -> bool = $ok;
-                if ok(value) { Ok(value) } else { Err(format!("expected {}, found {value}", $wanted)) }
-            })*
-        }
-        mod file {
-            use serde::{Deserialize, Deserializer, de::Error};
-            $(pub fn $name<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Option<$type>, D::Error> {
-                super::rule::$name(<$type>::deserialize(deserializer)?).map(Some).map_err(D::Error::custom)
+                if ok(value) { Ok(value) } else { Err(format!("expected {}", $wanted)) }
             })*
         }
     };
 }
 
-rules! {
+ranges! {
     samples: u32, |x| (1..=1 << 20).contains(&x), "1 to 1048576 samples";
     max_depth: u32, |x| (1..=1 << 16).contains(&x), "a depth from 1 to 65536";
     positive: f64, |x| x > 0.0 && x.is_finite(), "a number above 0";
     unit: f64, |x| (0.0..=1.0).contains(&x), "a number from 0 to 1";
+    seed: u64, |_| true, "a whole number from 0 to 18446744073709551615";
+    ior: f64, |x| (1e-6..=1e6).contains(&x), "an index above 0, from 1e-6 to 1e6";
     exposure: f64, |x| (-64.0..=64.0).contains(&x), "an exposure from -64 to 64 EV";
 }
 
 /// Options of `render` as given: on the command line, or in the scene's `[render]` table with `_` for `-`.
 ///
 /// What is `None` was not given; [`RenderArgs::or`] joins two of them.
-#[derive(Clone, Debug, Default, PartialEq, clap::Args, Deserialize)]
-#[serde(default, deny_unknown_fields)]
+#[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct RenderArgs {
-    /// Light transport model [default: single]
+    /// Light transport model; this version has single [default: single]
     #[arg(long, value_name = "NAME")]
     pub model: Option<Model>,
 
@@ -186,27 +183,23 @@ pub struct RenderArgs {
     pub size: Option<Size>,
 
     /// Samples per pixel [default: 16; path: 256]
-    #[arg(long, value_name = "N", value_parser = command_line::samples)]
-    #[serde(deserialize_with = "file::samples")]
+    #[arg(long, value_name = "N", value_parser = range::samples)]
     pub samples: Option<u32>,
 
-    /// Longest chain of interfaces [default: 32]
-    #[arg(long, value_name = "N", value_parser = command_line::max_depth)]
-    #[serde(deserialize_with = "file::max_depth")]
+    /// Longest chain of interfaces; model single sees one [default: 32]
+    #[arg(long, value_name = "N", value_parser = range::max_depth)]
     pub max_depth: Option<u32>,
 
-    /// Stop when the estimated relative error of the image is below X
-    #[arg(long, value_name = "X", value_parser = command_line::positive)]
-    #[serde(deserialize_with = "file::positive")]
+    /// Stop when the estimated relative error of the image is below X; not in model single
+    #[arg(long, value_name = "X", value_parser = range::positive)]
     pub tolerance: Option<f64>,
 
-    /// The best image within that time
-    #[arg(long, value_name = "SECONDS", value_parser = command_line::positive)]
-    #[serde(deserialize_with = "file::positive")]
+    /// The best image within that time, set-up included; writing the file comes on top. --samples caps it
+    #[arg(long, value_name = "SECONDS", value_parser = range::positive)]
     pub time_budget: Option<f64>,
 
     /// Seed of everything random [default: 0]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = range::seed)]
     pub seed: Option<u64>,
 
     /// Effects simulated: auto (those that the scene calls for), all, or a list; -name takes one away [default: auto]
@@ -214,13 +207,11 @@ pub struct RenderArgs {
     pub effects: Option<Selection>,
 
     /// Index of refraction of every dielectric
-    #[arg(long, value_name = "X", value_parser = command_line::positive)]
-    #[serde(deserialize_with = "file::positive")]
+    #[arg(long, value_name = "X", value_parser = range::ior)]
     pub ior: Option<f64>,
 
     /// Roughness of every dielectric, 0 to 1
-    #[arg(long, value_name = "X", value_parser = command_line::unit)]
-    #[serde(deserialize_with = "file::unit")]
+    #[arg(long, value_name = "X", value_parser = range::unit)]
     pub roughness: Option<f64>,
 
     /// Environment image in place of the scene's
@@ -228,15 +219,14 @@ pub struct RenderArgs {
     pub env: Option<PathBuf>,
 
     /// Exposure of a PNG in stops [default: 0]
-    #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = command_line::exposure)]
-    #[serde(deserialize_with = "file::exposure")]
+    #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = range::exposure)]
     pub exposure: Option<f64>,
 
     /// Tone curve of a PNG [default: neutral]
     #[arg(long, value_name = "NAME")]
     pub tonemap: Option<Tonemap>,
 
-    /// Extra layers in the EXR
+    /// Extra layers in the EXR; model single has normal, depth and object
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub aov: Option<Vec<Aov>>,
 
@@ -248,32 +238,51 @@ pub struct RenderArgs {
     #[arg(long, value_name = "HOW")]
     pub trace: Option<Trace>,
 
+    /// Run under the validation layer; any message makes the run fail with 1
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    pub validation: Option<bool>,
+
+    /// Write what the render took, as JSON
+    #[arg(long, value_name = "FILE")]
+    pub stats: Option<PathBuf>,
+
     /// Tints the transmission green (model single) [default: 0]
-    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
-    #[serde(deserialize_with = "file::unit")]
+    #[arg(long, value_name = "X", value_parser = range::unit, help_heading = "Debug controls of the original model")]
     pub transmission_green: Option<f64>,
 
     /// Tints the reflection red (model single) [default: 0]
-    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
-    #[serde(deserialize_with = "file::unit")]
+    #[arg(long, value_name = "X", value_parser = range::unit, help_heading = "Debug controls of the original model")]
     pub reflection_red: Option<f64>,
 
     /// Blends the transmission in, 0 to 1 (model single) [default: 1]
-    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
-    #[serde(deserialize_with = "file::unit")]
+    #[arg(long, value_name = "X", value_parser = range::unit, help_heading = "Debug controls of the original model")]
     pub transmission_intensity: Option<f64>,
 
     /// Blends the reflection in, 0 to 1 (model single) [default: 1]
-    #[arg(long, value_name = "X", value_parser = command_line::unit, help_heading = "Debug controls of the original model")]
-    #[serde(deserialize_with = "file::unit")]
+    #[arg(long, value_name = "X", value_parser = range::unit, help_heading = "Debug controls of the original model")]
     pub reflection_intensity: Option<f64>,
 
     /// Flips the ratio of the indices where the transmitted direction is computed (model single)
-    #[arg(long, num_args = 0..=1, default_missing_value = "true", value_name = "BOOL", help_heading = "Debug controls of the original model")]
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL", help_heading = "Debug controls of the original model")]
     pub flipped_ratio: Option<bool>,
 }
 
 impl RenderArgs {
+    /// The names of all options.
+    pub fn names() -> Vec<String> {
+        let command = Self::augment_args(clap::Command::new("render"));
+        command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
+    }
+
+    /// One option, as it would be given on the command line. An error is one line.
+    pub fn one(name: &str, value: &OsStr) -> Result<Self, String> {
+        let mut word = OsString::from(format!("--{name}="));
+        word.push(value);
+        let matches =
+            Self::augment_args(clap::Command::new("render").no_binary_name(true)).try_get_matches_from([word]);
+        matches.and_then(|matches| Self::from_arg_matches(&matches)).map_err(|error| one_line(&error))
+    }
+
     /// These options, and `fallback`'s where these are silent.
     #[must_use]
     pub fn or(self, fallback: Self) -> Self {
@@ -294,6 +303,8 @@ impl RenderArgs {
             aov: self.aov.or(fallback.aov),
             device: self.device.or(fallback.device),
             trace: self.trace.or(fallback.trace),
+            validation: self.validation.or(fallback.validation),
+            stats: self.stats.or(fallback.stats),
             transmission_green: self.transmission_green.or(fallback.transmission_green),
             reflection_red: self.reflection_red.or(fallback.reflection_red),
             transmission_intensity: self.transmission_intensity.or(fallback.transmission_intensity),
@@ -301,6 +312,52 @@ impl RenderArgs {
             flipped_ratio: self.flipped_ratio.or(fallback.flipped_ratio),
         }
     }
+}
+
+/// As on a command line: every option that is given.
+impl Display for RenderArgs {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let text = |value: Option<&dyn Display>| value.map(|value| value.to_string());
+        let given = [
+            ("model", self.model.map(|model| model.name().to_owned())),
+            ("size", text(self.size.as_ref().map(|x| x as _))),
+            ("samples", text(self.samples.as_ref().map(|x| x as _))),
+            ("max-depth", text(self.max_depth.as_ref().map(|x| x as _))),
+            ("tolerance", text(self.tolerance.as_ref().map(|x| x as _))),
+            ("time-budget", text(self.time_budget.as_ref().map(|x| x as _))),
+            ("seed", text(self.seed.as_ref().map(|x| x as _))),
+            ("effects", text(self.effects.as_ref().map(|x| x as _))),
+            ("ior", text(self.ior.as_ref().map(|x| x as _))),
+            ("roughness", text(self.roughness.as_ref().map(|x| x as _))),
+            ("env", self.env.as_ref().map(|path| path.display().to_string())),
+            ("exposure", text(self.exposure.as_ref().map(|x| x as _))),
+            ("tonemap", self.tonemap.map(|curve| curve.name().to_owned())),
+            ("aov", self.aov.as_ref().map(|aovs| aovs.iter().map(|aov| aov.name()).collect::<Vec<_>>().join(","))),
+            ("trace", self.trace.map(|trace| trace.name().to_owned())),
+            ("transmission-green", text(self.transmission_green.as_ref().map(|x| x as _))),
+            ("reflection-red", text(self.reflection_red.as_ref().map(|x| x as _))),
+            ("transmission-intensity", text(self.transmission_intensity.as_ref().map(|x| x as _))),
+            ("reflection-intensity", text(self.reflection_intensity.as_ref().map(|x| x as _))),
+            ("flipped-ratio", text(self.flipped_ratio.as_ref().map(|x| x as _))),
+        ];
+        let mut separator = "";
+        for (name, value) in given {
+            if let Some(value) = value {
+                write!(f, "{separator}--{name}={value}")?;
+                separator = " ";
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What clap has to say, without its layout: the message, what is possible, and where to read on.
+pub(crate) fn one_line(error: &clap::Error) -> String {
+    let text = error.render().to_string();
+    let told = text.lines().map(str::trim).filter(|line| !line.is_empty());
+    let told = told.take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"));
+    let told: Vec<_> = told.map(|line| line.strip_prefix("error: ").unwrap_or(line)).collect();
+    format!("{}; see --help", told.join("; "))
 }
 
 /// The debug controls of the original's user interface; they act in the model `single` alone.

@@ -2,7 +2,7 @@
 
 use std::time::Duration;
 
-use crate::effects::{Effect, Effects, Selection};
+use crate::effects::{Effect, Effects};
 use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap};
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -18,8 +18,6 @@ pub struct Plan {
     pub budget: Budget,
     /// Seed of everything random.
     pub seed: u64,
-    /// Which effects were asked for.
-    pub selection: Selection,
     /// Effects that are simulated.
     pub effects: Effects,
     /// Effects that were selected and that the model cannot honour.
@@ -32,6 +30,8 @@ pub struct Plan {
     pub aovs: Vec<Aov>,
     /// Controls of the original's user interface.
     pub debug: DebugControls,
+    /// Every option that was given, and the defaults of those that shape each picture.
+    pub options: RenderArgs,
 }
 
 /// How much is spent.
@@ -90,6 +90,7 @@ impl Plan {
                 "--aov {name}: model single does not have it; it has: normal, depth, object"
             )));
         }
+        let size = args.size.unwrap_or(Size { width: 1024, height: 768 });
         let budget = match args.time_budget {
             Some(seconds) => Budget::Seconds { seconds, most: args.samples.unwrap_or(MOST_SAMPLES) },
             None => Budget::Samples(args.samples.unwrap_or(16)),
@@ -101,16 +102,24 @@ impl Plan {
         };
         Ok(Self {
             model,
-            size: args.size.unwrap_or(Size { width: 1024, height: 768 }),
+            size,
             budget,
             seed: args.seed.unwrap_or(0),
-            selection,
             effects: share(true),
             unsupported: share(false),
             exposure: args.exposure.unwrap_or(0.0),
             tonemap: args.tonemap.unwrap_or_default(),
             aovs,
             debug: DebugControls::new(args),
+            options: args.clone().or(RenderArgs {
+                model: Some(model),
+                size: Some(size),
+                seed: Some(0),
+                effects: Some(selection),
+                exposure: Some(0.0),
+                tonemap: Some(Tonemap::default()),
+                ..RenderArgs::default()
+            }),
         })
     }
 }

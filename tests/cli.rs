@@ -39,6 +39,9 @@ fn bad_usage_and_bad_input_end_with_2_one_line_and_nothing_written() {
     write("glass.toml", b"[material.glass]\nkind = \"dielectric\"\nior = \"bk9\"\n");
     write("open.toml", b"[environment\n");
     write("option.toml", b"[render]\nsamples = 0\n");
+    write("typo2.toml", b"");
+    write("model.toml", b"[render]\nmodel = \"path\"\n");
+    write("size.toml", b"[render]\nsize = [64, 48, 3]\n");
     write("missing.toml", b"[[object]]\nmesh = \"nowhere.obj\"\n");
     write("sky.toml", b"[environment]\nimage = \"broken.exr\"\n");
     write("broken.exr", b"\x76\x2f\x31\x01\x02\x00\x00\x00chan");
@@ -58,10 +61,17 @@ fn bad_usage_and_bad_input_end_with_2_one_line_and_nothing_written() {
         (&["render", "-o", "a.png", "--size", "big"], &["big", "WIDTHxHEIGHT"]),
         (&["render", "-o", "a.png", "--samples", "0"], &["1 to 1048576"]),
         (&["render", "-o", "a.png", "--ior", "-1"], &["-1", "above 0"]),
-        (&["render", "-o", "a.png", "--roughness", "nan"], &["NaN", "0 to 1"]),
+        (&["render", "-o", "a.png", "--roughness", "nan"], &["nan", "0 to 1"]),
         (&["render", "-o", "a.png", "--model", "magic"], &["magic", "single"]),
         (&["render", "-o", "a.png", "--model", "tree"], &["tree", "single"]),
         (&["render", "-o", "a.png", "--effects", "magic"], &["magic", "direct-light"]),
+        (&["render", "-o", "a.png", "--seed", "-1"], &["-1", "whole number"]),
+        (&["render", "-o", "sky.toml", "sky.toml"], &["sky.toml", ".exr or .png"]),
+        (&["render", "-o", "a.png", "--stats", "a.png"], &["a.png", "two files"]),
+        (&["render", "-o", "a.png", "typo2.toml", "--stats", "typo2.toml"], &["typo2.toml", "replaced"]),
+        (&["render", "-o", "a.png", "model.toml"], &["model.toml", "path"]),
+        (&["render", "-o", "a.png", "size.toml"], &["size.toml:2", "width and height"]),
+        (&["render", "-o", "a.png", "."], &["folder"]),
         (&["render", "-o", "a.png", "--aov", "depth"], &["--aov", ".exr"]),
         (&["render", "-o", "a.exr", "--aov", "stderr"], &["stderr", "normal, depth, object"]),
         (&["render", "-o", "a.png", "--tolerance", "0.1"], &["--tolerance", "--samples"]),
@@ -182,8 +192,41 @@ fn a_run_under_validation_is_clean_and_its_stats_are_complete() {
 
     let bytes = fs::read(folder.path().join("a.exr")).expect("the image");
     let text = String::from_utf8_lossy(&bytes[..4096]);
-    for part in ["normal.X", "depth.Z", "object.ID", "vitrum:device", "vitrum:options", "--samples 3"] {
+    for part in ["normal.X", "depth.Z", "object.ID", "vitrum:device", "vitrum:options", "--samples=3"] {
         assert!(text.contains(part), "the EXR's header lacks {part}");
+    }
+}
+
+/// Paths that neither EXR's text nor a terminal's line can hold as they are.
+#[test]
+fn unusual_names_are_no_reason_to_fail() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    for name in ["模型.toml", "two\nlines.toml"] {
+        fs::write(folder.path().join(name), "[render]\nsize = [8, 8]\naov = [\"depth\"]\nvalidation = true\n")
+            .expect("a scene");
+        let output = vitrum(folder.path(), &["render", name, "-o", "a.exr"]);
+        assert_eq!(output.status.code(), Some(0), "{}", stderr(&output));
+    }
+    let output = vitrum(folder.path(), &["render", "no\nscene.toml", "-o", "a.exr"]);
+    assert_eq!(stderr(&output).lines().count(), 2, "{}", stderr(&output));
+}
+
+#[test]
+fn an_image_says_how_it_was_made() {
+    if !has_device() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let args =
+        ["render", "-q", "-o", "a.exr", "--size", "8x8", "--ior", "1.33", "--roughness", "0.2", "--aov", "depth"];
+    assert_eq!(vitrum(folder.path(), &args).status.code(), Some(0));
+    let bytes = fs::read(folder.path().join("a.exr")).expect("the image");
+    let text = String::from_utf8_lossy(&bytes);
+    for part in ["--ior=1.33", "--roughness=0.2", "--aov=depth", "--size=8x8", "--samples=16", "--effects=auto"] {
+        assert!(text.contains(part), "the header lacks {part}");
     }
 }
 

@@ -2,6 +2,8 @@
 
 mod common;
 
+use std::sync::Arc;
+
 use bytemuck::Zeroable;
 use glam::{DAffine3, DMat3, Vec2, Vec3};
 
@@ -104,11 +106,13 @@ fn probe(gpu: &Gpu, records: &Records, count: usize, wait: bool) -> vitrum::gpu:
     let output = Buffer::new(gpu, &BufferDesc { name: "members", size, usage: BufferUse::Storage })?;
     let readback = Buffer::new(gpu, &BufferDesc { name: "readback", size, usage: BufferUse::Readback })?;
     let uses = &[Use::CopyTarget, Use::Sampled];
-    let desc = ImageDesc { name: "environment", width: 1, height: 1, format: Format::R32G32B32A32_SFLOAT, uses };
+    let desc = ImageDesc { name: "environment", width: 1, height: 1, format: Format::Rgba32Float, uses };
     let environment = commands.upload_image(&desc, &[0; 16])?;
-    let mut bindings: Vec<_> = buffers.iter().map(Bind::Buffer).collect();
-    bindings.extend([Bind::Sampled(&environment), Bind::Buffer(&output)]);
-    let group = BindGroup::new(gpu, "probe", &bindings)?;
+    let environment = Arc::new(environment);
+    let output = Arc::new(output);
+    let mut bindings: Vec<_> = buffers.into_iter().map(|buffer| Bind::Buffer(Arc::new(buffer))).collect();
+    bindings.extend([Bind::Sampled(environment.clone()), Bind::Buffer(output.clone())]);
+    let group = BindGroup::new(gpu, "probe", bindings)?;
     let push_bytes = size_of::<SamplePush>() as u32;
     let shader = &shaders::PROBE_LAYOUT_COMP;
     let pipeline = ComputePipeline::new(gpu, shader, &group, push_bytes, &Specialization::default())?;
@@ -148,7 +152,7 @@ fn images_come_back_as_they_went_also_in_bands() {
     let mut commands = Commands::new(&validated.gpu).expect("commands");
     for (width, height) in [(1, 1), (3, 5), (4096, 600)] {
         let uses = &[Use::CopyTarget, Use::CopySource, Use::Sampled];
-        let format = Format::R32G32B32A32_SFLOAT;
+        let format = Format::Rgba32Float;
         let desc = ImageDesc { name: "there and back", width, height, format, uses };
         let texels: Vec<f32> = (0..4 * width * height).map(|i| i as f32).collect();
         let image = commands.upload_image(&desc, bytemuck::cast_slice(&texels)).expect("upload");
@@ -163,13 +167,8 @@ fn a_planted_misuse_is_caught() {
     let Some(validated) = Validated::open() else { return };
     let mut commands = Commands::new(&validated.gpu).expect("commands");
     // It was not made to be copied from.
-    let desc = ImageDesc {
-        name: "planted",
-        width: 4,
-        height: 4,
-        format: Format::R32G32B32A32_SFLOAT,
-        uses: &[Use::ColorTarget],
-    };
+    let desc =
+        ImageDesc { name: "planted", width: 4, height: 4, format: Format::Rgba32Float, uses: &[Use::ColorTarget] };
     let image = Image::new(&validated.gpu, &desc).expect("image");
     let _ = commands.read_image(&image);
     drop((image, commands));

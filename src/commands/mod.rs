@@ -10,6 +10,7 @@ use std::process::ExitCode;
 use clap::error::ErrorKind;
 use clap::{ArgAction, Args, Parser, Subcommand};
 
+use crate::options::one_line;
 use crate::{Error, Result};
 
 /// Renders glass, and shows what accuracy costs
@@ -93,21 +94,14 @@ pub fn main() -> ExitCode {
     }
 }
 
-/// What clap has to say, without its layout: the message, what is possible, and where to read on.
-fn one_line(error: &clap::Error) -> String {
-    let text = error.render().to_string();
-    let told = text.lines().map(str::trim).filter(|line| !line.is_empty());
-    let told = told.take_while(|line| !line.starts_with("Usage:") && !line.starts_with("For more information"));
-    let told: Vec<_> = told.map(|line| line.strip_prefix("error: ").unwrap_or(line)).collect();
-    format!("{}; see --help", told.join("; "))
-}
-
 /// The error and its causes, a line each; a cause that only repeats what is above it is left out.
 fn report(error: &Error) {
-    let mut lines = vec![format!("error: {error}")];
+    // A path may hold a line break; a line of ours does not.
+    let whole = |text: String| text.replace('\n', "\\n");
+    let mut lines = vec![whole(format!("error: {error}"))];
     let mut source = error.source();
     while let Some(cause) = source {
-        let line = format!("Caused by: {cause}");
+        let line = whole(format!("Caused by: {cause}"));
         if lines.last() != Some(&line) {
             lines.push(line);
         }

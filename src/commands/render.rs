@@ -1,18 +1,18 @@
 //! `vitrum render`: one image, off screen.
 
 use std::path::{Path, PathBuf};
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
-use crate::gpu::{Gpu, Instance};
+use crate::gpu::{DeviceInfo, Gpu, Instance};
 use crate::image::{FloatImage, ImageFormat, Layer, OutputFile, encode_exr, encode_png};
 use crate::options::RenderArgs;
 use crate::passes::{self, Aovs, Rendered};
 use crate::plan::{Budget, Plan};
-use crate::report::Stats;
+use crate::report::{Run, Stats};
 use crate::scene::{Overrides, Scene};
 use crate::{Error, Result};
 
@@ -29,14 +29,6 @@ pub(super) struct RenderCommand {
 
     #[command(flatten)]
     options: RenderArgs,
-
-    /// Run under the validation layer; any message makes the run fail with 1
-    #[arg(long)]
-    validation: bool,
-
-    /// Write what the render took, as JSON
-    #[arg(long, value_name = "FILE")]
-    stats: Option<PathBuf>,
 }
 
 impl RenderCommand {
@@ -50,23 +42,26 @@ impl RenderCommand {
         })?;
         let format = ImageFormat::of(output)?;
         let output = OutputFile::new(output)?;
-        let stats_file = self.stats.as_deref().map(OutputFile::new).transpose()?;
 
         let overrides = Overrides {
             ior: self.options.ior,
             roughness: self.options.roughness,
             environment: self.options.env.clone(),
         };
-        let scene = Scene::load(self.scene.as_deref(), &overrides)?;
+        let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
         let load = start.elapsed();
         let idle = idle_options(&self.options, format);
-        let args = self.options.or(scene.render.clone());
-        let mut plan = Plan::new(&scene, &args)?;
-        if format == ImageFormat::Png && !plan.aovs.is_empty() {
-            return Err(Error::Usage("--aov adds layers to an EXR; name the output .exr".into()));
-        }
-        let instance = Instance::new(self.validation)?;
-        let gpu = Gpu::open(&instance, instance.choose(args.device.as_deref())?)?;
+        let mut plan = self.plan(&scene, format)?;
+        scene.frame(f64::from(plan.size.width) / f64::from(plan.size.height));
+        let options = &plan.options;
+        let stats_file = options.stats.as_deref().map(OutputFile::new).transpose()?;
+        self.keep_apart(&output, stats_file.as_ref(), options)?;
+
+        let validation = options.validation == Some(true);
+        let instance = Instance::new(validation)?;
+        let gpu = Gpu::open(&instance, instance.choose(options.device.as_deref())?)?;
+        passes::check(&gpu, &plan)?;
+        let device = gpu.info().clone();
 
         for warning in &scene.warnings {
             talk.note(&format!("warning: {warning}"));
@@ -76,46 +71,83 @@ impl RenderCommand {
         }
         if plan.unsupported != Default::default() {
             let (model, names) = (plan.model.name(), plan.unsupported.names().join(", "));
-            talk.note(&format!("note: model {model} does not simulate what the scene calls for: {names}"));
+            talk.note(&format!("note: model {model} does not simulate {names}"));
         }
-        let device = gpu.info().clone();
         talk.detail(&format!("device: {} ({})", device.name, device.driver));
+        talk.detail(&format!("options: {}", plan.options));
+
         let bar = progress_bar(&plan, talk);
         plan.budget = plan.budget.less(start.elapsed());
-        let rendered = passes::render(&gpu, &scene, &plan, &mut |done, _| bar.set_position(done.into()))?;
+        let rendered = passes::render(&gpu, &scene, &plan, &mut |done| bar.set_position(done.into()))?;
         bar.finish_and_clear();
 
-        let mut stats = Stats::new(&device, &scene, &plan, &rendered, load);
-        stats.peak_gpu_bytes = gpu.peak_bytes();
-        let metadata = metadata(&stats, &plan);
+        let metadata = metadata(&device, &scene, &plan, rendered.samples);
         let bytes = match format {
             ImageFormat::Png => {
                 let pixels: Vec<[u8; 3]> = rendered.display.iter().map(|&[r, g, b, _]| [r, g, b]).collect();
                 encode_png(plan.size.width, plan.size.height, &pixels, &metadata)
             }
-            ImageFormat::Exr => encode_exr(&float_image(rendered, &plan), &metadata),
+            ImageFormat::Exr => encode_exr(&float_image(&rendered, &plan), &metadata),
         };
         let bytes = bytes.map_err(|source| Error::file(output.path(), "write", source))?;
         output.write(&bytes)?;
 
         // The layer's last words come when everything is destroyed.
+        let peak_gpu_bytes = gpu.peak_bytes();
         let messages = instance.messages();
         drop((gpu, instance));
-        stats.validation_messages = self.validation.then(|| messages.count());
-        stats.finish(start.elapsed());
+        let validation_messages = validation.then(|| messages.count());
+        let run = Run { load, wall: start.elapsed(), peak_gpu_bytes, validation_messages };
+        let stats = Stats::new(&device, &scene, &plan, &rendered, run);
         if let Some(file) = &stats_file {
             file.write(stats.json().as_bytes())?;
         }
         if stats.non_finite_pixels > 0 {
             talk.note(&format!("warning: {} pixels are not finite", stats.non_finite_pixels));
         }
-        talk.note(&summary(output.path(), &stats, start.elapsed()));
+        talk.note(&summary(output.path(), &stats));
         match messages.all().as_slice() {
             [] => Ok(()),
             [first, rest @ ..] => {
                 let first = first.lines().next().unwrap_or_default();
                 Err(Error::Check(format!("the validation layer has {} messages, the first: {first}", rest.len() + 1)))
             }
+        }
+    }
+
+    /// What is asked for, on the command line and in the scene. A conflict that the command line has no part in is the
+    /// scene's.
+    fn plan(&self, scene: &Scene, format: ImageFormat) -> Result<Plan> {
+        let plan = |options: &RenderArgs| -> Result<Plan> {
+            let plan = Plan::new(scene, options)?;
+            if format == ImageFormat::Png && !plan.aovs.is_empty() {
+                return Err(Error::Usage("--aov adds layers to an EXR; name the output .exr".into()));
+            }
+            Ok(plan)
+        };
+        plan(&self.options.clone().or(scene.render.clone())).map_err(|error| match (plan(&self.options), &self.scene) {
+            (Ok(_), Some(path)) => Error::input(path, 0, format!("[render]: {error}")),
+            _ => error,
+        })
+    }
+
+    /// An output must not replace an input, nor another output.
+    fn keep_apart(&self, output: &OutputFile, stats: Option<&OutputFile>, options: &RenderArgs) -> Result<()> {
+        let inputs = [self.scene.as_deref(), options.env.as_deref()];
+        for input in inputs.into_iter().flatten() {
+            for file in [Some(output), stats].into_iter().flatten().filter(|file| file.replaces(input)) {
+                return Err(Error::input(
+                    file.path(),
+                    0,
+                    "is read by this render and would be replaced; name another file",
+                ));
+            }
+        }
+        match stats {
+            Some(stats) if output.replaces(stats.path()) => {
+                Err(Error::input(stats.path(), 0, "is to hold both the image and the stats; name two files"))
+            }
+            _ => Ok(()),
         }
     }
 }
@@ -149,9 +181,9 @@ fn progress_bar(plan: &Plan, talk: Talk) -> ProgressBar {
     }
 }
 
-fn float_image(rendered: Rendered, plan: &Plan) -> FloatImage {
+fn float_image(rendered: &Rendered, plan: &Plan) -> FloatImage {
     let mut layers = Vec::new();
-    if let Some(Aovs { normal, depth, object }) = rendered.aovs {
+    if let Some(Aovs { normal, depth, object }) = &rendered.aovs {
         let channel = |name: &str, values: Vec<f32>| (name.to_owned(), values);
         for aov in &plan.aovs {
             let axis = |axis: usize| normal.iter().map(|normal| normal[axis]).collect();
@@ -163,40 +195,25 @@ fn float_image(rendered: Rendered, plan: &Plan) -> FloatImage {
             layers.push(Layer { name: aov.name().into(), channels });
         }
     }
-    FloatImage { width: plan.size.width, height: plan.size.height, pixels: rendered.radiance, layers }
+    FloatImage { width: plan.size.width, height: plan.size.height, pixels: rendered.radiance.clone(), layers }
 }
 
 /// What the image says about its making; nothing that differs from run to run.
-fn metadata(stats: &Stats, plan: &Plan) -> Vec<(String, String)> {
-    let mut options = format!(
-        "--model {} --size {} --samples {} --seed {} --effects {}",
-        stats.model, plan.size, stats.samples, stats.seed, plan.selection
-    );
-    options += &format!(" --exposure {} --tonemap {}", plan.exposure, plan.tonemap.name());
-    let debug = &plan.debug;
-    options += &format!(
-        " --transmission-green {} --reflection-red {} --transmission-intensity {} --reflection-intensity {}",
-        debug.transmission_green, debug.reflection_red, debug.transmission_intensity, debug.reflection_intensity
-    );
-    options += &format!(" --flipped-ratio {}", debug.flipped_ratio);
+fn metadata(device: &DeviceInfo, scene: &Scene, plan: &Plan, samples: u32) -> Vec<(String, String)> {
+    // As many as there are, also where a time budget decided.
+    let options = RenderArgs { samples: Some(samples), time_budget: None, ..plan.options.clone() };
     [
-        ("Software", format!("vitrum {}", stats.vitrum)),
-        ("vitrum:device", format!("{}, {}, Vulkan {}", stats.device.name, stats.device.driver, stats.device.api)),
-        ("vitrum:scene", stats.scene.clone()),
-        ("vitrum:options", options),
+        ("Software", format!("vitrum {}", env!("CARGO_PKG_VERSION"))),
+        ("vitrum:device", format!("{}, {}, Vulkan {}", device.name, device.driver, device.api)),
+        ("vitrum:scene", scene.name.clone()),
+        ("vitrum:options", options.to_string()),
     ]
     .map(|(key, value)| (key.to_owned(), value))
     .into()
 }
 
-fn summary(output: &Path, stats: &Stats, wall: Duration) -> String {
-    format!(
-        "{}: {}x{}, {} samples, {:.2} s on {}",
-        output.display(),
-        stats.size[0],
-        stats.size[1],
-        stats.samples,
-        wall.as_secs_f64(),
-        stats.device.name
-    )
+fn summary(output: &Path, stats: &Stats) -> String {
+    let samples = if stats.samples == 1 { "1 sample".into() } else { format!("{} samples", stats.samples) };
+    let ([width, height], seconds) = (stats.size, stats.wall_ms * 1e-3);
+    format!("{}: {width}x{height}, {samples}, {seconds:.2} s on {}", output.display(), stats.device.name)
 }

@@ -1,22 +1,24 @@
 //! Resources that a pipeline sees: a descriptor set, written once.
 
+use std::sync::Arc;
+
 use ash::vk;
 
 use super::error::Context;
 use super::{Buffer, Gpu, Image, Result};
 
 /// A resource at one binding; its position in the list is the binding's number.
-#[derive(Clone, Copy)]
-pub enum Bind<'a> {
+#[derive(Clone)]
+pub enum Bind {
     /// A storage buffer.
-    Buffer(&'a Buffer),
+    Buffer(Arc<Buffer>),
     /// An image that shaders fetch texels from.
-    Sampled(&'a Image),
+    Sampled(Arc<Image>),
     /// An image that shaders read and write.
-    Storage(&'a Image),
+    Storage(Arc<Image>),
 }
 
-impl Bind<'_> {
+impl Bind {
     fn kind(&self) -> vk::DescriptorType {
         match self {
             Self::Buffer(_) => vk::DescriptorType::STORAGE_BUFFER,
@@ -26,35 +28,41 @@ impl Bind<'_> {
     }
 }
 
-/// Set 0 of a pipeline. The resources must outlive its use in a recording, which borrowing both from one owner ensures.
+/// Set 0 of a pipeline, and the resources in it.
 pub struct BindGroup {
     pub(super) layout: vk::DescriptorSetLayout,
     pub(super) set: vk::DescriptorSet,
+    /// What is bound where: a pipeline takes groups of the kinds that it was made with.
+    pub(super) kinds: Vec<vk::DescriptorType>,
     pool: vk::DescriptorPool,
     gpu: Gpu,
+    resources: Vec<Bind>,
 }
 
 impl BindGroup {
     /// A group of `resources`, in the order of their bindings.
-    pub fn new(gpu: &Gpu, name: &str, resources: &[Bind<'_>]) -> Result<Self> {
+    pub fn new(gpu: &Gpu, name: &str, resources: Vec<Bind>) -> Result<Self> {
+        let kinds: Vec<_> = resources.iter().map(Bind::kind).collect();
+        let stages = vk::ShaderStageFlags::VERTEX | vk::ShaderStageFlags::FRAGMENT | vk::ShaderStageFlags::COMPUTE;
         let bindings: Vec<_> = (0..)
-            .zip(resources)
-            .map(|(binding, resource)| {
+            .zip(&kinds)
+            .map(|(binding, &kind)| {
                 vk::DescriptorSetLayoutBinding::default()
                     .binding(binding)
-                    .descriptor_type(resource.kind())
+                    .descriptor_type(kind)
                     .descriptor_count(1)
-                    .stage_flags(vk::ShaderStageFlags::ALL)
+                    .stage_flags(stages)
             })
             .collect();
         // Kinds that repeat may be listed as often as they occur.
-        let sizes: Vec<_> =
-            resources.iter().map(|r| vk::DescriptorPoolSize { ty: r.kind(), descriptor_count: 1 }).collect();
+        let sizes: Vec<_> = kinds.iter().map(|&ty| vk::DescriptorPoolSize { ty, descriptor_count: 1 }).collect();
         let mut group = Self {
             layout: vk::DescriptorSetLayout::null(),
             set: vk::DescriptorSet::null(),
+            kinds,
             pool: vk::DescriptorPool::null(),
             gpu: gpu.clone(),
+            resources: resources,
         };
         let layout = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         let pool = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
@@ -69,16 +77,21 @@ impl BindGroup {
         }
         gpu.name(group.layout, name);
         gpu.name(group.set, name);
-        for (binding, resource) in (0..).zip(resources) {
+        group.write();
+        Ok(group)
+    }
+
+    fn write(&self) {
+        for (binding, resource) in (0..).zip(&self.resources) {
             let write = vk::WriteDescriptorSet::default()
-                .dst_set(group.set)
+                .dst_set(self.set)
                 .dst_binding(binding)
                 .descriptor_type(resource.kind());
             let image = |image: &Image, layout| {
                 [vk::DescriptorImageInfo::default().image_view(image.view).image_layout(layout)]
             };
-            // SAFETY: the set is not in use yet; resources and infos are alive.
-            let update = |write| unsafe { gpu.device.update_descriptor_sets(&[write], &[]) };
+            // SAFETY: the set is not in use yet; the group holds the resources, and the infos are alive.
+            let update = |write| unsafe { self.gpu.device.update_descriptor_sets(&[write], &[]) };
             match resource {
                 Bind::Buffer(buffer) => {
                     let info = [vk::DescriptorBufferInfo::default().buffer(buffer.handle).range(vk::WHOLE_SIZE)];
@@ -90,7 +103,6 @@ impl BindGroup {
                 Bind::Storage(storage) => update(write.image_info(&image(storage, vk::ImageLayout::GENERAL))),
             }
         }
-        Ok(group)
     }
 }
 

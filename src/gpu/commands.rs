@@ -1,10 +1,13 @@
 //! Recording, submitting, waiting and timing.
 
+use std::marker::PhantomData;
+use std::sync::PoisonError;
+
 use ash::vk;
 use bytemuck::NoUninit;
 
 use super::error::Context;
-use super::pipeline::Pipeline;
+use super::pipeline::{PUSH_STAGES, Pipeline};
 use super::{
     BindGroup, Buffer, BufferDesc, BufferUse, ComputePipeline, Gpu, GpuError, GraphicsPipeline, Image, ImageDesc,
     Result, Use,
@@ -61,7 +64,9 @@ impl Commands {
     }
 
     /// Records what `record` says, submits it and waits until the device is done. Returns the times of its passes.
-    pub fn run(&mut self, record: impl FnOnce(&mut Recorder<'_>)) -> Result<Vec<PassTime>> {
+    ///
+    /// What is recorded is borrowed for `'r`, which outlives this call.
+    pub fn run<'r>(&mut self, record: impl FnOnce(&mut Recorder<'_, 'r>)) -> Result<Vec<PassTime>> {
         let device = &self.gpu.device;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last submission was waited for, so pool, buffer and queries are free.
@@ -70,17 +75,23 @@ impl Commands {
             device.begin_command_buffer(self.buffer, &begin).context("vkBeginCommandBuffer")?;
             device.cmd_reset_query_pool(self.buffer, self.queries, 0, 2 * MAX_TIMED);
         }
-        let mut recorder = Recorder { commands: self, timed: Vec::new() };
+        let mut recorder = Recorder { commands: self, timed: Vec::new(), recorded: PhantomData };
         record(&mut recorder);
         let timed = recorder.timed;
         let buffers = [vk::CommandBufferSubmitInfo::default().command_buffer(self.buffer)];
         let submit = [vk::SubmitInfo2::default().command_buffer_infos(&buffers)];
-        // SAFETY: recording has ended; everything recorded is borrowed by the caller until this returns, which is after the
-        // fence. `&mut self` and the single queue of a single-threaded renderer keep submissions apart.
+        // SAFETY: recording has ended; everything recorded is borrowed for longer than this call, which returns after the
+        // fence or, should waiting fail, after the device is idle or lost. The lock keeps submissions of other threads apart.
         unsafe {
             device.end_command_buffer(self.buffer).context("vkEndCommandBuffer")?;
-            device.queue_submit2(self.gpu.queue, &submit, self.fence).context("vkQueueSubmit2")?;
-            device.wait_for_fences(&[self.fence], true, u64::MAX).context("vkWaitForFences")?;
+            {
+                let queue = self.gpu.queue.lock().unwrap_or_else(PoisonError::into_inner);
+                device.queue_submit2(*queue, &submit, self.fence).context("vkQueueSubmit2")?;
+            }
+            if let Err(result) = device.wait_for_fences(&[self.fence], true, u64::MAX) {
+                let _ = device.device_wait_idle();
+                return Err(result).context("vkWaitForFences");
+            }
             device.reset_fences(&[self.fence]).context("vkResetFences")?;
         }
         self.times(&timed)
@@ -133,7 +144,12 @@ impl Commands {
         let row_bytes = image.texel_bytes() * u64::from(image.width());
         let desc = BufferDesc { name: "readback", size: row_bytes * u64::from(rows), usage: BufferUse::Readback };
         let buffer = Buffer::new(&self.gpu, &desc)?;
-        let mut texels = Vec::with_capacity((row_bytes * u64::from(image.height())) as usize);
+        let mut texels = Vec::new();
+        let bytes = row_bytes * u64::from(image.height());
+        texels.try_reserve_exact(bytes as usize).map_err(|_| GpuError::OutOfMemory {
+            what: format!("a copy of {} MiB for the host", bytes >> 20),
+            state: "the system has no more".into(),
+        })?;
         for first in (0..image.height()).step_by(rows as usize) {
             let count = rows.min(image.height() - first);
             self.run(|cmd| cmd.copy_from_rows(image, first, count, &buffer))?;
@@ -172,10 +188,11 @@ impl Drop for Commands {
     }
 }
 
-/// A recording under way.
-pub struct Recorder<'a> {
+/// A recording under way, of things borrowed for `'r`.
+pub struct Recorder<'a, 'r> {
     commands: &'a Commands,
     timed: Vec<&'static str>,
+    recorded: PhantomData<&'r ()>,
 }
 
 /// A target of a render pass.
@@ -187,7 +204,7 @@ pub struct Target<'a> {
     pub clear: Option<[f32; 4]>,
 }
 
-impl Recorder<'_> {
+impl<'r> Recorder<'_, 'r> {
     fn device(&self) -> &ash::Device {
         &self.commands.gpu.device
     }
@@ -197,7 +214,7 @@ impl Recorder<'_> {
         let index = self.timed.len() as u32;
         let (buffer, queries) = (self.commands.buffer, self.commands.queries);
         let clock = index < MAX_TIMED && self.commands.gpu.info().timestamp_bits > 0;
-        if clock {
+        if index < MAX_TIMED {
             self.timed.push(name);
         }
         let stamp = |recorder: &Self, query| {
@@ -219,12 +236,12 @@ impl Recorder<'_> {
     }
 
     /// Waits for the last use of `image`, then makes it ready for `next`.
-    pub fn use_image(&mut self, image: &Image, next: Use) {
+    pub fn use_image(&mut self, image: &'r Image, next: Use) {
         self.change_use(image, image.replace_use(next), next);
     }
 
     /// As [`use_image`](Self::use_image), for a use that overwrites all of the content.
-    pub fn overwrite_image(&mut self, image: &Image, next: Use) {
+    pub fn overwrite_image(&mut self, image: &'r Image, next: Use) {
         let before = image.replace_use(next);
         let ((src_stage, src_access), (dst_stage, dst_access)) = (before.access(), next.access());
         self.barrier(image, (src_stage, src_access, Use::Nothing), (dst_stage, dst_access, next));
@@ -257,9 +274,21 @@ impl Recorder<'_> {
         unsafe { self.device().cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
     }
 
-    /// Draws into `colors` and `depth`, which are all of one size.
-    pub fn render(&mut self, colors: &[Target<'_>], depth: Option<Target<'_>>, draw: impl FnOnce(&mut RenderPass<'_>)) {
-        let mut attach = |target: &Target<'_>, next: Use| {
+    /// Draws into `colors` and `depth`, of which there is at least one.
+    ///
+    /// # Panics
+    ///
+    /// If they are not of one size.
+    pub fn render(
+        &mut self,
+        colors: &[Target<'r>],
+        depth: Option<Target<'r>>,
+        draw: impl FnOnce(&mut RenderPass<'_, 'r>),
+    ) {
+        let mut extents = colors.iter().chain(&depth).map(|target| target.image.extent);
+        let Some(extent) = extents.next() else { return };
+        assert!(extents.all(|other| other == extent), "targets of different sizes");
+        let mut attach = |target: &Target<'r>, next: Use| {
             let mut info = vk::RenderingAttachmentInfo::default()
                 .image_view(target.image.view)
                 .image_layout(next.layout())
@@ -281,7 +310,6 @@ impl Recorder<'_> {
         };
         let color_infos: Vec<_> = colors.iter().map(|target| attach(target, Use::ColorTarget)).collect();
         let depth_info = depth.as_ref().map(|target| attach(target, Use::DepthTarget));
-        let Some(extent) = colors.iter().chain(&depth).map(|target| target.image.extent).next() else { return };
         let area = vk::Rect2D { offset: vk::Offset2D::default(), extent };
         let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color_infos);
         if let Some(depth) = &depth_info {
@@ -308,7 +336,17 @@ impl Recorder<'_> {
     }
 
     /// Runs a compute shader over `groups` workgroups.
-    pub fn dispatch<P: NoUninit>(&mut self, pipeline: &ComputePipeline, group: &BindGroup, push: &P, groups: [u32; 3]) {
+    ///
+    /// # Panics
+    ///
+    /// If the pipeline was made for another kind of group or push constants.
+    pub fn dispatch<P: NoUninit>(
+        &mut self,
+        pipeline: &'r ComputePipeline,
+        group: &'r BindGroup,
+        push: &P,
+        groups: [u32; 3],
+    ) {
         let point = vk::PipelineBindPoint::COMPUTE;
         bind(self.commands, pipeline.inner(), point, group);
         push_constants(self.commands, pipeline.inner(), push);
@@ -330,7 +368,7 @@ impl Recorder<'_> {
     }
 
     /// Copies as much as both hold.
-    pub fn copy_buffer(&mut self, from: &Buffer, to: &Buffer) {
+    pub fn copy_buffer(&mut self, from: &'r Buffer, to: &'r Buffer) {
         let region = [vk::BufferCopy::default().size(from.size.min(to.size))];
         // SAFETY: both are alive and of at least that size.
         unsafe { self.device().cmd_copy_buffer(self.commands.buffer, from.handle, to.handle, &region) };
@@ -338,7 +376,7 @@ impl Recorder<'_> {
         self.make_visible_to_host();
     }
 
-    fn copy_to_rows(&mut self, from: &Buffer, to: &Image, first: u32, count: u32) {
+    fn copy_to_rows(&mut self, from: &'r Buffer, to: &'r Image, first: u32, count: u32) {
         self.use_image(to, Use::CopyTarget);
         let region = [rows(to, first, count)];
         // SAFETY: the buffer holds `count` rows; the image is in the layout named.
@@ -348,7 +386,7 @@ impl Recorder<'_> {
         }
     }
 
-    fn copy_from_rows(&mut self, from: &Image, first: u32, count: u32, to: &Buffer) {
+    fn copy_from_rows(&mut self, from: &'r Image, first: u32, count: u32, to: &'r Buffer) {
         self.use_image(from, Use::CopySource);
         let region = [rows(from, first, count)];
         // SAFETY: the buffer has room for `count` rows; the image is in the layout named.
@@ -395,28 +433,33 @@ pub struct Sides {
 }
 
 /// Draws inside of [`Recorder::render`].
-pub struct RenderPass<'a> {
+pub struct RenderPass<'a, 'r> {
     commands: &'a Commands,
-    bound: Option<vk::PipelineLayout>,
+    bound: Option<&'r Pipeline>,
 }
 
-impl RenderPass<'_> {
+impl<'r> RenderPass<'_, 'r> {
     /// The pipeline and the resources of the draws that follow.
-    pub fn bind(&mut self, pipeline: &GraphicsPipeline, group: &BindGroup) {
+    ///
+    /// # Panics
+    ///
+    /// If the pipeline was made for another kind of group.
+    pub fn bind(&mut self, pipeline: &'r GraphicsPipeline, group: &'r BindGroup) {
         bind(self.commands, pipeline.inner(), vk::PipelineBindPoint::GRAPHICS, group);
-        self.bound = Some(pipeline.inner().layout);
+        self.bound = Some(pipeline.inner());
     }
 
     /// Draws `vertices` vertices, of which the triangles on `sides` show; nothing if no pipeline is bound.
+    ///
+    /// # Panics
+    ///
+    /// If the pipeline was made for other push constants.
     pub fn draw<P: NoUninit>(&mut self, push: &P, vertices: u32, sides: Sides) {
-        let Some(layout) = self.bound else { return };
+        let Some(pipeline) = self.bound else { return };
+        push_constants(self.commands, pipeline, push);
         let device = &self.commands.gpu.device;
-        // SAFETY: a pipeline with this layout is bound inside of a rendering.
+        // SAFETY: a pipeline, its group and its push constants are bound inside of a rendering.
         unsafe {
-            let bytes = bytemuck::bytes_of(push);
-            if !bytes.is_empty() {
-                device.cmd_push_constants(self.commands.buffer, layout, vk::ShaderStageFlags::ALL, 0, bytes);
-            }
             let front = if sides.clockwise { vk::FrontFace::CLOCKWISE } else { vk::FrontFace::COUNTER_CLOCKWISE };
             let cull = if sides.fronts_only { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
             device.cmd_set_front_face(self.commands.buffer, front);
@@ -427,7 +470,8 @@ impl RenderPass<'_> {
 }
 
 fn bind(commands: &Commands, pipeline: &Pipeline, point: vk::PipelineBindPoint, group: &BindGroup) {
-    // SAFETY: pipeline and set are alive, and made for one another.
+    assert!(pipeline.kinds == group.kinds, "a bind group of another kind");
+    // SAFETY: pipeline and set are borrowed for longer than they execute, and their layouts are the same.
     unsafe {
         let device = &commands.gpu.device;
         device.cmd_bind_pipeline(commands.buffer, point, pipeline.handle);
@@ -437,11 +481,12 @@ fn bind(commands: &Commands, pipeline: &Pipeline, point: vk::PipelineBindPoint, 
 
 fn push_constants<P: NoUninit>(commands: &Commands, pipeline: &Pipeline, push: &P) {
     let bytes = bytemuck::bytes_of(push);
+    assert_eq!(bytes.len(), pipeline.push_bytes as usize, "push constants of another size");
     if !bytes.is_empty() {
-        // SAFETY: the layout has a range of these bytes for every stage.
+        // SAFETY: the layout has a range of just these bytes.
         unsafe {
             let device = &commands.gpu.device;
-            device.cmd_push_constants(commands.buffer, pipeline.layout, vk::ShaderStageFlags::ALL, 0, bytes);
+            device.cmd_push_constants(commands.buffer, pipeline.layout, PUSH_STAGES, 0, bytes);
         }
     }
 }

@@ -20,7 +20,8 @@ pub struct Gpu(Arc<Open>);
 /// What a [`Gpu`] refers to. Handles are destroyed in [`Drop`], before the fields, the instance among them.
 pub struct Open {
     pub(super) device: ash::Device,
-    pub(super) queue: vk::Queue,
+    /// One submission at a time.
+    pub(super) queue: Mutex<vk::Queue>,
     pub(super) allocator: ManuallyDrop<Mutex<Allocator>>,
     pub(super) ledger: Mutex<Ledger>,
     names: Option<ext::debug_utils::Device>,
@@ -83,7 +84,7 @@ impl Gpu {
         let names = instance.validates().then(|| ext::debug_utils::Device::new(&instance.handle, &device));
         Ok(Self(Arc::new(Open {
             device,
-            queue,
+            queue: Mutex::new(queue),
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             ledger: Mutex::default(),
             names,

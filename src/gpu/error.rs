@@ -90,7 +90,9 @@ impl GpuError {
     /// 2 where another command line would do, 3 where no device can be used.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::OutOfMemory { .. } | Self::TooLarge { .. } | Self::UnknownDevice { .. } => 2,
+            Self::OutOfMemory { .. } | Self::TooLarge { .. } | Self::UnknownDevice { .. } | Self::NoValidationLayer => {
+                2
+            }
             _ => 3,
         }
     }

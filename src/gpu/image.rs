@@ -2,7 +2,7 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use ash::vk::{self, Format};
+use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::Allocation;
 
@@ -75,6 +75,38 @@ impl Use {
     }
 }
 
+/// What a texel holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Four 32-bit floats.
+    Rgba32Float,
+    /// Four 16-bit floats.
+    Rgba16Float,
+    /// Four bytes, from 0 to 1.
+    Rgba8,
+    /// A depth of 32-bit float.
+    Depth32,
+}
+
+impl Format {
+    pub(super) fn handle(self) -> vk::Format {
+        match self {
+            Self::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
+            Self::Rgba16Float => vk::Format::R16G16B16A16_SFLOAT,
+            Self::Rgba8 => vk::Format::R8G8B8A8_UNORM,
+            Self::Depth32 => vk::Format::D32_SFLOAT,
+        }
+    }
+
+    fn bytes(self) -> u64 {
+        match self {
+            Self::Rgba32Float => 16,
+            Self::Rgba16Float => 8,
+            Self::Rgba8 | Self::Depth32 => 4,
+        }
+    }
+}
+
 /// How an image is made.
 #[derive(Clone, Copy, Debug)]
 pub struct ImageDesc<'a> {
@@ -117,15 +149,15 @@ impl Image {
         let extent = vk::Extent2D { width: desc.width, height: desc.height };
         let info = vk::ImageCreateInfo::default()
             .image_type(vk::ImageType::TYPE_2D)
-            .format(desc.format)
+            .format(desc.format.handle())
             .extent(extent.into())
             .mip_levels(1)
             .array_layers(1)
             .samples(vk::SampleCountFlags::TYPE_1)
             .tiling(vk::ImageTiling::OPTIMAL)
             .usage(desc.uses.iter().fold(vk::ImageUsageFlags::empty(), |flags, usage| flags | usage.flag()));
-        // SAFETY: the size is within the device's limits; every format that Vitrum names is one that Vulkan guarantees for
-        // its uses.
+        // SAFETY: the size is within the device's limits; Vulkan guarantees the colour formats for these uses, and a device is
+        // only opened if it has the depth format.
         let handle = unsafe { gpu.device.create_image(&info, None) }.context("vkCreateImage")?;
         // From here on, dropping `image` cleans up; a null view is ignored then.
         let mut image = Self {
@@ -149,7 +181,7 @@ impl Image {
         let view = vk::ImageViewCreateInfo::default()
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)
-            .format(desc.format)
+            .format(desc.format.handle())
             .subresource_range(image.range());
         // SAFETY: the image is bound to memory, and the view names its own format and its only level.
         image.view = unsafe { gpu.device.create_image_view(&view, None) }.context("vkCreateImageView")?;
@@ -169,7 +201,7 @@ impl Image {
 
     /// The only level and layer.
     pub(super) fn range(&self) -> vk::ImageSubresourceRange {
-        let depth = self.format == Format::D32_SFLOAT;
+        let depth = self.format == Format::Depth32;
         let aspect_mask = if depth { vk::ImageAspectFlags::DEPTH } else { vk::ImageAspectFlags::COLOR };
         vk::ImageSubresourceRange {
             aspect_mask,
@@ -182,11 +214,7 @@ impl Image {
 
     /// Bytes of one texel.
     pub(super) fn texel_bytes(&self) -> u64 {
-        match self.format {
-            Format::R32G32B32A32_SFLOAT => 16,
-            Format::R16G16B16A16_SFLOAT => 8,
-            _ => 4,
-        }
+        self.format.bytes()
     }
 
     /// The use before, replaced by `next`.

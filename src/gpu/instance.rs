@@ -179,11 +179,12 @@ impl Instance {
             result => Err(result),
         });
         let handles = handles.context("vkEnumeratePhysicalDevices")?;
-        handles.into_iter().enumerate().map(|(index, handle)| self.inspect(index, handle)).collect()
+        Ok(handles.into_iter().enumerate().map(|(index, handle)| self.inspect(index, handle)).collect())
     }
 
-    /// The device of that index or with that in its name (in any case); `None`: the best one.
+    /// The device of that index, of that name, or with that in its name (in any case); `None` or nothing: the best one.
     pub fn choose(&self, wanted: Option<&str>) -> Result<DeviceInfo> {
+        let wanted = wanted.filter(|wanted| !wanted.is_empty());
         let devices = self.devices()?;
         if devices.is_empty() {
             return Err(GpuError::NoDevice);
@@ -198,41 +199,43 @@ impl Instance {
                 .ok_or(GpuError::NoUsableDevice(all));
         };
         let found = devices.iter().map(|d| format!("{} ({})", d.index, d.name)).collect();
-        let name = wanted.to_lowercase();
-        let device = devices
-            .into_iter()
-            .find(|d| wanted.parse() == Ok(d.index) || (!name.is_empty() && d.name.to_lowercase().contains(&name)))
-            .ok_or(GpuError::UnknownDevice { wanted: wanted.into(), found })?;
+        let names: Vec<_> = devices.iter().map(|device| device.name.as_str()).collect();
+        let Some(index) = find(wanted, &names) else {
+            return Err(GpuError::UnknownDevice { wanted: wanted.into(), found });
+        };
+        let device = devices[index].clone();
         if !device.missing.is_empty() {
             return Err(GpuError::Lacking { name: device.name, missing: device.missing });
         }
         Ok(device)
     }
 
-    fn inspect(&self, index: usize, handle: vk::PhysicalDevice) -> Result<DeviceInfo> {
+    fn inspect(&self, index: usize, handle: vk::PhysicalDevice) -> DeviceInfo {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
         let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
         // SAFETY: `handle` was enumerated from this instance. A device older than 1.3 ignores structs that it does not know,
         // and what stays false then reads as missing.
-        let (families, memory, extensions) = unsafe {
+        let (families, memory, depth, extensions) = unsafe {
             self.handle.get_physical_device_properties2(handle, &mut properties);
             self.handle.get_physical_device_features2(handle, &mut features);
             (
                 self.handle.get_physical_device_queue_family_properties(handle),
                 self.handle.get_physical_device_memory_properties(handle),
+                self.handle.get_physical_device_format_properties(handle, vk::Format::D32_SFLOAT),
                 self.handle.enumerate_device_extension_properties(handle),
             )
         };
-        let extensions = extensions.context("vkEnumerateDeviceExtensionProperties")?;
+        // A device that cannot list its extensions has none that matter.
+        let extensions = extensions.unwrap_or_default();
         let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let properties = properties.properties;
         let work = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         let queue_family = families.iter().position(|family| family.queue_flags.contains(work));
 
         let text = |text: Result<&CStr, _>| text.map_or(String::new(), |text| text.to_string_lossy().into_owned());
-        Ok(DeviceInfo {
+        DeviceInfo {
             handle,
             queue_family: queue_family.unwrap_or(0) as u32,
             limits: properties.limits,
@@ -251,13 +254,38 @@ impl Instance {
             memory: memory.memory_heaps_as_slice().iter().map(|heap| heap.size).max().unwrap_or(0),
             sub_pixel_bits: properties.limits.sub_pixel_precision_bits,
             ray_query: has(ash::khr::acceleration_structure::NAME) && has(ash::khr::ray_query::NAME),
-            missing: missing(properties.api_version, &vulkan13, queue_family.is_some()),
-        })
+            missing: missing(
+                properties.api_version,
+                &vulkan13,
+                &properties.limits,
+                depth.optimal_tiling_features,
+                queue_family.is_some(),
+            ),
+        }
     }
 }
 
+/// Which of the devices called `names` is meant: a number is an index and nothing else.
+fn find(wanted: &str, names: &[&str]) -> Option<usize> {
+    if let Ok(index) = wanted.parse::<usize>() {
+        return (index < names.len()).then_some(index);
+    }
+    let wanted = wanted.to_lowercase();
+    let names: Vec<_> = names.iter().map(|name| name.to_lowercase()).collect();
+    names.iter().position(|name| *name == wanted).or_else(|| names.iter().position(|name| name.contains(&wanted)))
+}
+
+/// Storage buffers that one shader sees at most.
+const STORAGE_BUFFERS: u32 = 8;
+
 /// What Vitrum needs of a device, and this one lacks.
-fn missing(api: u32, features: &vk::PhysicalDeviceVulkan13Features<'_>, queue: bool) -> Vec<String> {
+fn missing(
+    api: u32,
+    features: &vk::PhysicalDeviceVulkan13Features<'_>,
+    limits: &vk::PhysicalDeviceLimits,
+    depth: vk::FormatFeatureFlags,
+    queue: bool,
+) -> Vec<String> {
     let mut missing = Vec::new();
     if api < vk::API_VERSION_1_3 {
         missing.push(format!("Vulkan 1.3 (it has {})", version_text(api)));
@@ -266,6 +294,8 @@ fn missing(api: u32, features: &vk::PhysicalDeviceVulkan13Features<'_>, queue: b
         (features.dynamic_rendering == vk::TRUE, "the feature dynamicRendering"),
         (features.synchronization2 == vk::TRUE, "the feature synchronization2"),
         (features.maintenance4 == vk::TRUE, "the feature maintenance4"),
+        (limits.max_per_stage_descriptor_storage_buffers >= STORAGE_BUFFERS, "8 storage buffers in one shader"),
+        (depth.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT), "depth images of 32-bit float"),
         (queue, "a queue for graphics and compute"),
     ] {
         if !there {
@@ -322,14 +352,29 @@ mod tests {
 
     #[test]
     fn what_an_old_device_lacks_is_named() {
-        let all = vk::PhysicalDeviceVulkan13Features::default()
+        let features = vk::PhysicalDeviceVulkan13Features::default()
             .dynamic_rendering(true)
             .synchronization2(true)
             .maintenance4(true);
-        assert!(missing(vk::API_VERSION_1_3, &all, true).is_empty());
-        assert_eq!(missing(vk::make_api_version(0, 1, 2, 131), &all, true), ["Vulkan 1.3 (it has 1.2.131)"]);
+        let limits = vk::PhysicalDeviceLimits { max_per_stage_descriptor_storage_buffers: 8, ..Default::default() };
+        let depth = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
+        assert!(missing(vk::API_VERSION_1_3, &features, &limits, depth, true).is_empty());
+        let old = missing(vk::make_api_version(0, 1, 2, 131), &features, &limits, depth, true);
+        assert_eq!(old, ["Vulkan 1.3 (it has 1.2.131)"]);
         let none = vk::PhysicalDeviceVulkan13Features::default();
-        assert_eq!(missing(vk::API_VERSION_1_3, &none, false).len(), 4);
-        assert!(missing(vk::API_VERSION_1_3, &none, true)[0].contains("dynamicRendering"));
+        let all = missing(vk::API_VERSION_1_3, &none, &Default::default(), vk::FormatFeatureFlags::empty(), false);
+        assert_eq!(all.len(), 6, "{all:?}");
+        assert!(all[0].contains("dynamicRendering"));
+    }
+
+    #[test]
+    fn a_number_is_an_index_and_a_name_may_be_part_of_one() {
+        let names = ["llvmpipe (LLVM 15.0.6, 256 bits)", "GeForce 1060", "GeForce"];
+        assert_eq!(find("1", &names), Some(1));
+        assert_eq!(find("15", &names), None);
+        assert_eq!(find("LLVM", &names), Some(0));
+        assert_eq!(find("geforce", &names), Some(2));
+        assert_eq!(find("geforce 10", &names), Some(1));
+        assert_eq!(find("abacus", &names), None);
     }
 }

@@ -102,6 +102,7 @@ pub struct BufferDesc<'a> {
 pub struct Buffer {
     pub(super) handle: vk::Buffer,
     pub(super) size: u64,
+    usage: BufferUse,
     allocation: Option<Allocation>,
     gpu: Gpu,
 }
@@ -132,7 +133,7 @@ impl Buffer {
         // SAFETY: the device is alive; the size is not 0.
         let handle = unsafe { gpu.device.create_buffer(&info, None) }.context("vkCreateBuffer")?;
         // From here on, dropping `buffer` cleans up.
-        let mut buffer = Self { handle, size, allocation: None, gpu: gpu.clone() };
+        let mut buffer = Self { handle, size, usage: desc.usage, allocation: None, gpu: gpu.clone() };
         gpu.name(handle, desc.name);
         // SAFETY: the buffer was just made on this device.
         let requirements = unsafe { gpu.device.get_buffer_memory_requirements(handle) };
@@ -163,7 +164,8 @@ impl Buffer {
 
     /// What the device has copied here; empty unless made for [`BufferUse::Readback`].
     pub fn bytes(&self) -> &[u8] {
-        let memory = self.allocation.as_ref().and_then(Allocation::mapped_slice);
+        let readable = self.usage == BufferUse::Readback;
+        let memory = self.allocation.as_ref().filter(|_| readable).and_then(Allocation::mapped_slice);
         memory.map_or(&[], |memory| &memory[..self.size as usize])
     }
 }

@@ -16,12 +16,11 @@ mod pipeline;
 mod shader;
 mod shared;
 
-pub use ash::vk::Format;
 pub use bind_group::{Bind, BindGroup};
 pub use commands::{Commands, PassTime, Recorder, RenderPass, Sides, Target};
 pub use device::Gpu;
 pub use error::GpuError;
-pub use image::{Image, ImageDesc, Use};
+pub use image::{Format, Image, ImageDesc, Use};
 pub use instance::{DeviceInfo, DeviceKind, Instance, Messages};
 pub use memory::{Buffer, BufferDesc, BufferUse};
 pub use pipeline::{ComputePipeline, Depth, GraphicsPipeline, GraphicsPipelineDesc, Specialization};

@@ -2,12 +2,22 @@
 
 use std::mem::size_of;
 
-use ash::vk::{self, Format};
+use ash::vk;
 
 use super::error::Context;
 use super::shader::Module;
-use super::{BindGroup, Gpu, Result, Shader};
+use super::{BindGroup, Format, Gpu, Result, Shader};
 use crate::effects::{Effect, Effects};
+
+/// The stages that see push constants.
+pub(super) const PUSH_STAGES: vk::ShaderStageFlags = vk::ShaderStageFlags::from_raw(
+    vk::ShaderStageFlags::VERTEX.as_raw()
+        | vk::ShaderStageFlags::FRAGMENT.as_raw()
+        | vk::ShaderStageFlags::COMPUTE.as_raw(),
+);
+
+/// What every device has room for.
+const MAX_PUSH_BYTES: u32 = 128;
 
 /// Values of specialization constants, by id.
 #[derive(Clone, Debug, Default)]
@@ -77,19 +87,24 @@ pub struct ComputePipeline(Pipeline);
 pub(super) struct Pipeline {
     pub(super) handle: vk::Pipeline,
     pub(super) layout: vk::PipelineLayout,
+    /// Kinds of the resources in its bind group.
+    pub(super) kinds: Vec<vk::DescriptorType>,
+    /// Size of its push constants.
+    pub(super) push_bytes: u32,
     gpu: Gpu,
 }
 
 impl Pipeline {
     /// Its layout; the pipeline itself is still missing.
     fn new(gpu: &Gpu, group: &BindGroup, push_bytes: u32) -> Result<Self> {
+        assert!(push_bytes <= MAX_PUSH_BYTES && push_bytes % 4 == 0, "{push_bytes} bytes of push constants");
         let sets = [group.layout];
-        let ranges = [vk::PushConstantRange { stage_flags: vk::ShaderStageFlags::ALL, offset: 0, size: push_bytes }];
+        let ranges = [vk::PushConstantRange { stage_flags: PUSH_STAGES, offset: 0, size: push_bytes }];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);
         let info = if push_bytes > 0 { info.push_constant_ranges(&ranges) } else { info };
-        // SAFETY: the set's layout is alive; 128 bytes of push constants are guaranteed and none uses more.
+        // SAFETY: the set's layout is alive, and the push constants fit, see above.
         let layout = unsafe { gpu.device.create_pipeline_layout(&info, None) }.context("vkCreatePipelineLayout")?;
-        Ok(Self { handle: vk::Pipeline::null(), layout, gpu: gpu.clone() })
+        Ok(Self { handle: vk::Pipeline::null(), layout, kinds: group.kinds.clone(), push_bytes, gpu: gpu.clone() })
     }
 }
 
@@ -140,9 +155,10 @@ impl GraphicsPipeline {
             vk::DynamicState::CULL_MODE,
             vk::DynamicState::FRONT_FACE,
         ]);
-        let depth_format = if desc.depth == Depth::Ignored { Format::UNDEFINED } else { Format::D32_SFLOAT };
+        let depth_format = if desc.depth == Depth::Ignored { vk::Format::UNDEFINED } else { Format::Depth32.handle() };
+        let colors: Vec<_> = desc.colors.iter().map(|color| color.handle()).collect();
         let mut targets = vk::PipelineRenderingCreateInfo::default()
-            .color_attachment_formats(desc.colors)
+            .color_attachment_formats(&colors)
             .depth_attachment_format(depth_format);
         let info = vk::GraphicsPipelineCreateInfo::default()
             .stages(&stages)

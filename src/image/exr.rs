@@ -27,7 +27,7 @@ pub fn encode(image: &FloatImage, metadata: &Metadata) -> std::io::Result<Vec<u8
     }
     let mut attributes = LayerAttributes::default();
     for (key, value) in metadata {
-        attributes.other.insert(Text::from(key.as_str()), AttributeValue::Text(Text::from(value.as_str())));
+        attributes.other.insert(latin(key), AttributeValue::Text(latin(value)));
     }
     let encoding =
         Encoding { compression: Compression::ZIP16, blocks: Blocks::ScanLines, line_order: LineOrder::Increasing };
@@ -38,6 +38,15 @@ pub fn encode(image: &FloatImage, metadata: &Metadata) -> std::io::Result<Vec<u8
     let mut bytes = bytes.into_inner();
     sort_attributes(&mut bytes);
     Ok(bytes)
+}
+
+/// Text as EXR can hold it: characters beyond Latin-1 are written as escapes.
+fn latin(text: &str) -> Text {
+    let escaped: String = text
+        .chars()
+        .map(|c| if u32::from(c) < 0x100 { c.to_string() } else { c.escape_unicode().to_string() })
+        .collect();
+    Text::from(escaped.as_str())
 }
 
 /// Puts the attributes of the header into the order of their names: the `exr` crate writes them in a random one.

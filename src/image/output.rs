@@ -69,6 +69,16 @@ impl OutputFile {
         Ok(output)
     }
 
+    /// Whether writing this would replace the file at `other`.
+    pub fn replaces(&self, other: &Path) -> bool {
+        let place = |path: &Path| {
+            let path = behind_links(path).unwrap_or_else(|_| path.into());
+            let folder = folder_of(&path).canonicalize().ok()?;
+            Some(folder.join(path.file_name()?))
+        };
+        place(&self.target).is_some_and(|target| Some(target) == place(other))
+    }
+
     /// The path as given.
     pub fn path(&self) -> &Path {
         &self.path

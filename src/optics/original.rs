@@ -1,17 +1,17 @@
 //! The original's equations, as its report states them: A. Ferreira Gomes, "Glass Refraction Using BSDF for Smooth
 //! Dielectrics" (2025), section 3. `shaders/bsdf.glsl` computes the same.
 //!
-//! Indices are not swapped where a surface is seen from behind: the cosine is negative there.
+//! Indices are not swapped where a surface is seen from behind: the cosine is negative there. Written as the report writes it, not
+//! as the shader arranges it: 64 bits bear the cancellations.
 
 use std::f64::consts::PI;
 
 use glam::DVec3;
 
-/// Cosine of the transmitted angle by Snell's law, E(3); 0 where light is totally reflected. `eta_i_over_t` is the index on
-/// the side of the viewer over the one beyond.
-pub fn get_cos_theta_tr(cos_theta_in: f64, eta_i_over_t: f64) -> f64 {
+/// Cosine of the transmitted angle by Snell's law, E(3); 0 where light is totally reflected.
+pub fn get_cos_theta_tr(cos_theta_in: f64, eta_i: f64, eta_t: f64) -> f64 {
     let sin_theta_in = (1.0 - cos_theta_in * cos_theta_in).max(0.0).sqrt();
-    let sin_theta_tr = sin_theta_in * eta_i_over_t;
+    let sin_theta_tr = sin_theta_in * eta_i / eta_t;
     (1.0 - sin_theta_tr * sin_theta_tr).max(0.0).sqrt()
 }
 
@@ -19,7 +19,7 @@ pub fn get_cos_theta_tr(cos_theta_in: f64, eta_i_over_t: f64) -> f64 {
 /// the shader's stays finite.
 pub fn fresnel_bsdf(cos_theta_in: f64, eta_in: f64, eta_tr: f64) -> f64 {
     let cos_theta_in = cos_theta_in.clamp(-1.0, 1.0);
-    let cos_theta_tr = get_cos_theta_tr(cos_theta_in, eta_in / eta_tr);
+    let cos_theta_tr = get_cos_theta_tr(cos_theta_in, eta_in, eta_tr);
     if cos_theta_tr <= 0.0 {
         return 1.0;
     }
@@ -38,7 +38,7 @@ pub fn reflection_dir(view_dir: DVec3, normal: DVec3) -> DVec3 {
 pub fn transmission_dir(view_dir: DVec3, normal: DVec3, refraction_index: f64, flipped: bool) -> Option<DVec3> {
     let cos_theta_in = normal.dot(view_dir).clamp(-1.0, 1.0);
     let eta_i_over_t = 1.0 / refraction_index;
-    let cos_theta_tr = get_cos_theta_tr(cos_theta_in, eta_i_over_t);
+    let cos_theta_tr = get_cos_theta_tr(cos_theta_in, 1.0, refraction_index);
     if cos_theta_tr <= 0.0 {
         return None;
     }

@@ -1,6 +1,6 @@
 //! What lies at the centre of each pixel: normal, distance, object. Not antialiased, so that values stay what they are.
 
-use super::resources::Resources;
+use super::resources::{Draw, Resources};
 use super::view;
 use crate::gpu::{
     Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
@@ -9,7 +9,7 @@ use crate::gpu::{
 use crate::options::Size;
 use glam::DVec2;
 
-const VALUES: Format = Format::R32G32B32A32_SFLOAT;
+const VALUES: Format = Format::Rgba32Float;
 
 /// Values at the centres of the pixels, row 0 at the top; 0 where there is nothing but environment.
 #[derive(Clone, Debug)]
@@ -48,6 +48,7 @@ impl AovPass {
         &self,
         commands: &mut Commands,
         resources: &Resources,
+        draws: &[Draw],
         size: Size,
     ) -> Result<(Aovs, Vec<PassTime>)> {
         let gpu = commands.gpu().clone();
@@ -56,7 +57,7 @@ impl AovPass {
         let image = |name| Image::new(&gpu, &ImageDesc { name, width, height, format: VALUES, uses });
         let (normal_depth, object) = (image("normal and depth")?, image("object")?);
         let desc =
-            ImageDesc { name: "depth of aov", width, height, format: Format::D32_SFLOAT, uses: &[Use::DepthTarget] };
+            ImageDesc { name: "depth of aov", width, height, format: Format::Depth32, uses: &[Use::DepthTarget] };
         let depth = Image::new(&gpu, &desc)?;
         let clear = Some([0.0; 4]);
         let push = view::sample_push(size, DVec2::ZERO);
@@ -65,7 +66,7 @@ impl AovPass {
                 let colors = [Target { image: &normal_depth, clear }, Target { image: &object, clear }];
                 cmd.render(&colors, Some(Target { image: &depth, clear }), |pass| {
                     pass.bind(&self.pipeline, &resources.group);
-                    for (instance_index, draw) in (0..).zip(&resources.draws) {
+                    for (instance_index, draw) in (0..).zip(draws) {
                         pass.draw(&SamplePush { instance_index, ..push }, draw.vertices, draw.sides);
                     }
                 });

@@ -1,16 +1,16 @@
-//! From the sum of all samples to what a screen shows.
+//! From the mean of all samples to what a screen shows.
 
 use bytemuck::{Pod, Zeroable};
 
 use super::Targets;
 use crate::gpu::{
-    Bind, BindGroup, Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime,
-    Result, Sides, Specialization, Target, Use, shaders,
+    Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result, Sides,
+    Specialization, Target, Use, shaders,
 };
 use crate::plan::Plan;
 
 /// Encoded by the shader, so that the tone curve sees the same values on every kind of target.
-const DISPLAY: Format = Format::R8G8B8A8_UNORM;
+const DISPLAY: Format = Format::Rgba8;
 
 pub(super) struct Display {
     pipeline: GraphicsPipeline,
@@ -22,10 +22,6 @@ pub(super) struct Display {
 struct Push {
     scale: f32,
     curve: u32,
-}
-
-pub(super) fn group(gpu: &Gpu, total: &Image) -> Result<BindGroup> {
-    BindGroup::new(gpu, "display", &[Bind::Sampled(total)])
 }
 
 impl Display {
@@ -52,22 +48,21 @@ impl Display {
         commands: &mut Commands,
         targets: &Targets,
         plan: &Plan,
-        samples: u32,
     ) -> Result<(Vec<[u8; 4]>, Vec<PassTime>)> {
         let screen = Image::new(
             commands.gpu(),
             &ImageDesc {
                 name: "display",
-                width: targets.total.width(),
-                height: targets.total.height(),
+                width: targets.mean.width(),
+                height: targets.mean.height(),
                 format: DISPLAY,
                 uses: &[Use::ColorTarget, Use::CopySource],
             },
         )?;
-        let push = Push { scale: (plan.exposure.exp2() / f64::from(samples)) as f32, curve: plan.tonemap as u32 };
+        let push = Push { scale: plan.exposure.exp2() as f32, curve: plan.tonemap as u32 };
         let time = commands.run(|cmd| {
             cmd.timed("display", |cmd| {
-                cmd.use_image(&targets.total, Use::Sampled);
+                cmd.use_image(&targets.mean, Use::Sampled);
                 cmd.render(&[Target { image: &screen, clear: Some([0.0; 4]) }], None, |pass| {
                     pass.bind(&self.pipeline, &targets.display);
                     pass.draw(&push, 3, Sides::default());

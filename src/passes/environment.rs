@@ -28,7 +28,13 @@ impl EnvironmentPass {
         Ok(Self { pipeline })
     }
 
-    pub(super) fn record(&self, cmd: &mut Recorder<'_>, resources: &Resources, targets: &Targets, push: SamplePush) {
+    pub(super) fn record<'r>(
+        &'r self,
+        cmd: &mut Recorder<'_, 'r>,
+        resources: &'r Resources,
+        targets: &'r Targets,
+        push: SamplePush,
+    ) {
         let color = Target { image: &targets.radiance, clear: None };
         let depth = Target { image: &targets.depth, clear: None };
         cmd.render(&[color], Some(depth), |pass| {

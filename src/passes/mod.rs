@@ -12,9 +12,12 @@ mod sampling;
 mod single;
 mod view;
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use crate::gpu::{Commands, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Recorder, Result, SamplePush, Use};
+use crate::gpu::{
+    Bind, BindGroup, Commands, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Recorder, Result, SamplePush, Use,
+};
 use crate::options::Size;
 use crate::plan::{Budget, Plan};
 use crate::scene::Scene;
@@ -23,13 +26,13 @@ use accumulate::Accumulate;
 use aov::AovPass;
 use display::Display;
 use environment::EnvironmentPass;
-use resources::Resources;
+use resources::{Draw, Resources};
 use single::Single;
 
 pub use aov::Aovs;
 
-/// Radiance in flight, and sums of it.
-const RADIANCE: Format = Format::R32G32B32A32_SFLOAT;
+/// Radiance in flight, and means of it.
+const RADIANCE: Format = Format::Rgba32Float;
 
 /// A finished picture and what it took.
 #[derive(Clone, Debug)]
@@ -50,9 +53,8 @@ pub struct Rendered {
     pub pipelines: Duration,
 }
 
-/// Renders `scene` as `plan` says. `progress` hears how many samples are done, of how many.
-pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u32, u32)) -> Result<Rendered> {
-    let start = Instant::now();
+/// Whether `gpu` can do what `plan` says.
+pub fn check(gpu: &Gpu, plan: &Plan) -> Result<()> {
     let limit = gpu.max_image_side();
     if plan.size.width.max(plan.size.height) > limit {
         return Err(GpuError::TooLarge {
@@ -62,46 +64,52 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
             advice: "use a smaller --size",
         });
     }
+    Ok(())
+}
+
+/// Renders `scene` as `plan` says. `progress` hears how many samples are done.
+pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u32)) -> Result<Rendered> {
+    let start = Instant::now();
+    check(gpu, plan)?;
     let mut commands = Commands::new(gpu)?;
     let resources = Resources::new(&mut commands, scene, plan)?;
     let upload = start.elapsed();
 
     let passes = Passes::new(&mut commands, &resources, plan)?;
-    let pipelines = start.elapsed() - upload;
+    let set_up = start.elapsed();
 
     let targets = Targets::new(gpu, plan.size)?;
     let mut times = Times::default();
     let mut samples = 0;
     for offset in sampling::pixel_offsets(plan.budget, plan.seed) {
         let push = view::sample_push(plan.size, offset);
-        times.add(commands.run(|cmd| passes.sample(cmd, &resources, &targets, push, samples))?);
+        times.add(commands.run(|cmd| passes.sample(cmd, &resources, &targets, &resources.draws, push, samples))?);
         samples += 1;
-        progress(samples, plan.budget.most());
-        if is_spent(plan.budget, start.elapsed(), samples) {
+        progress(samples);
+        if is_spent(plan.budget, set_up, start.elapsed(), samples) {
             break;
         }
     }
 
-    let (display, time) = passes.display.run(&mut commands, &targets, plan, samples)?;
+    let (display, time) = passes.display.run(&mut commands, &targets, plan)?;
     times.add(time);
-    let radiance = mean(&commands.read_image(&targets.total)?, samples);
-    let aovs = match plan.aovs.is_empty() {
-        true => None,
-        false => {
-            let (aovs, time) = AovPass::new(gpu, &resources)?.run(&mut commands, &resources, plan.size)?;
-            times.add(time);
-            Some(aovs)
-        }
-    };
-    Ok(Rendered { radiance, display, aovs, samples, passes: times.0, upload, pipelines })
+    let radiance = radiance(&commands.read_image(&targets.mean)?)?;
+    let mut aovs = None;
+    if let Some(pass) = &passes.aov {
+        let (values, time) = pass.run(&mut commands, &resources, &resources.draws, plan.size)?;
+        times.add(time);
+        aovs = Some(values);
+    }
+    Ok(Rendered { radiance, display, aovs, samples, passes: times.0, upload, pipelines: set_up - upload })
 }
 
-/// The passes of a sample, in their order, and the one that ends the frame.
+/// The passes of a sample, in their order, and those that end the frame.
 struct Passes {
     single: Single,
     environment: EnvironmentPass,
     accumulate: Accumulate,
     display: Display,
+    aov: Option<AovPass>,
 }
 
 impl Passes {
@@ -115,37 +123,56 @@ impl Passes {
             environment: EnvironmentPass::new(&gpu, resources)?,
             accumulate: Accumulate::new(&gpu, &targets)?,
             display: Display::new(&gpu, &targets)?,
+            aov: if plan.aovs.is_empty() { None } else { Some(AovPass::new(&gpu, resources)?) },
         };
-        commands.run(|cmd| passes.sample(cmd, &resources.few(), &targets, SamplePush::default(), 0))?;
-        passes.display.run(commands, &targets, plan, 1)?;
+        let few: Vec<_> =
+            resources.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect();
+        commands.run(|cmd| passes.sample(cmd, resources, &targets, &few, SamplePush::default(), 0))?;
+        passes.display.run(commands, &targets, plan)?;
+        if let Some(aov) = &passes.aov {
+            aov.run(commands, resources, &few, small)?;
+        }
         Ok(passes)
     }
 
-    fn sample(&self, cmd: &mut Recorder<'_>, resources: &Resources, targets: &Targets, push: SamplePush, index: u32) {
-        cmd.timed("single", |cmd| self.single.record(cmd, resources, targets, push));
+    fn sample<'r>(
+        &'r self,
+        cmd: &mut Recorder<'_, 'r>,
+        resources: &'r Resources,
+        targets: &'r Targets,
+        draws: &[Draw],
+        push: SamplePush,
+        index: u32,
+    ) {
+        cmd.timed("single", |cmd| self.single.record(cmd, resources, targets, draws, push));
         cmd.timed("environment", |cmd| self.environment.record(cmd, resources, targets, push));
         cmd.timed("accumulate", |cmd| self.accumulate.record(cmd, targets, index));
     }
 }
 
-/// Images of the picture's size.
+/// Images of the picture's size, and the groups that hold them.
 struct Targets {
-    radiance: Image,
+    accumulation: BindGroup,
+    display: BindGroup,
+    radiance: Arc<Image>,
+    mean: Arc<Image>,
     depth: Image,
-    total: Image,
-    accumulate: crate::gpu::BindGroup,
-    display: crate::gpu::BindGroup,
 }
 
 impl Targets {
     fn new(gpu: &Gpu, Size { width, height }: Size) -> Result<Self> {
         let image = |name, format, uses| Image::new(gpu, &ImageDesc { name, width, height, format, uses });
-        let radiance = image("radiance", RADIANCE, &[Use::ColorTarget, Use::Sampled])?;
-        let depth = image("depth", Format::D32_SFLOAT, &[Use::DepthTarget])?;
-        let total = image("total", RADIANCE, &[Use::Storage, Use::Sampled, Use::CopySource])?;
-        let accumulate = accumulate::group(gpu, &radiance, &total)?;
-        let display = display::group(gpu, &total)?;
-        Ok(Self { radiance, depth, total, accumulate, display })
+        let radiance = Arc::new(image("radiance", RADIANCE, &[Use::ColorTarget, Use::Sampled])?);
+        let mean = Arc::new(image("mean", RADIANCE, &[Use::Storage, Use::Sampled, Use::CopySource])?);
+        let depth = image("depth", Format::Depth32, &[Use::DepthTarget])?;
+        let accumulation = vec![Bind::Sampled(radiance.clone()), Bind::Storage(mean.clone())];
+        Ok(Self {
+            accumulation: BindGroup::new(gpu, "accumulation", accumulation)?,
+            display: BindGroup::new(gpu, "display", vec![Bind::Sampled(mean.clone())])?,
+            radiance,
+            mean,
+            depth,
+        })
     }
 }
 
@@ -165,21 +192,26 @@ impl Times {
 }
 
 /// Whether another sample like those before would end after the time.
-fn is_spent(budget: Budget, elapsed: Duration, samples: u32) -> bool {
+fn is_spent(budget: Budget, set_up: Duration, elapsed: Duration, samples: u32) -> bool {
     match budget {
         Budget::Samples(_) => false,
-        Budget::Seconds { seconds, .. } => elapsed.as_secs_f64() * (1.0 + 1.0 / f64::from(samples)) > seconds,
+        Budget::Seconds { seconds, .. } => {
+            let sampling = elapsed.saturating_sub(set_up);
+            (elapsed + sampling / samples).as_secs_f64() > seconds
+        }
     }
 }
 
-fn mean(total: &[u8], samples: u32) -> Vec<[f32; 3]> {
-    let scale = 1.0 / f64::from(samples);
-    let value = |sum: f32| (f64::from(sum) * scale) as f32;
-    total
-        .chunks_exact(16)
-        .map(|texel| {
-            let [r, g, b, _]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
-            [value(r), value(g), value(b)]
-        })
-        .collect()
+/// The colours of an image of [`RADIANCE`].
+fn radiance(texels: &[u8]) -> Result<Vec<[f32; 3]>> {
+    let mut radiance = Vec::new();
+    radiance.try_reserve_exact(texels.len() / 16).map_err(|_| GpuError::OutOfMemory {
+        what: "the image on the host".into(),
+        state: "the system has no more".into(),
+    })?;
+    radiance.extend(texels.chunks_exact(16).map(|texel| {
+        let [r, g, b, _]: [f32; 4] = bytemuck::pod_read_unaligned(texel);
+        [r, g, b]
+    }));
+    Ok(radiance)
 }

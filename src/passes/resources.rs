@@ -1,14 +1,14 @@
 //! The scene on the device.
 
-use std::rc::Rc;
+use std::sync::Arc;
 
 use glam::{DAffine3, DMat3, DVec3, Vec3};
 use half::f16;
 
 use super::view::View;
 use crate::gpu::{
-    Bind, BindGroup, Buffer, Commands, Format, Frame, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord,
-    Result, Sides, Specialization, Use,
+    Bind, BindGroup, Commands, Format, Frame, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord, Result,
+    Sides, Specialization, Use,
 };
 use crate::plan::Plan;
 use crate::scene::{Dielectric, Mesh, Panorama, Scene, Surface, Surroundings};
@@ -16,15 +16,14 @@ use crate::scene::{Dielectric, Mesh, Panorama, Scene, Surface, Surroundings};
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
 
-/// Buffers and images that every pass sees, as one group. The buffers are held so that the group stays valid.
+/// Buffers and images that every pass sees, as one group.
 pub(super) struct Resources {
-    pub(super) group: Rc<BindGroup>,
+    pub(super) group: BindGroup,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
     /// From lengths on the device to metres.
     pub(super) metres_per_unit: f64,
-    held: Rc<(Vec<Buffer>, Image)>,
 }
 
 impl Resources {
@@ -48,27 +47,14 @@ impl Resources {
             commands.upload_buffer("triangles", &geometry.triangles)?,
         ];
         commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
-        let mut bindings: Vec<_> = buffers.iter().map(Bind::Buffer).collect();
-        bindings.push(Bind::Sampled(&environment));
-        let group = BindGroup::new(commands.gpu(), "scene", &bindings)?;
+        let mut bindings: Vec<_> = buffers.into_iter().map(|buffer| Bind::Buffer(Arc::new(buffer))).collect();
+        bindings.push(Bind::Sampled(Arc::new(environment)));
         Ok(Self {
-            group: Rc::new(group),
+            group: BindGroup::new(commands.gpu(), "scene", bindings)?,
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects).with(ENVIRONMENT_IMAGE, specialization),
             metres_per_unit: 1.0 / view.units_per_metre,
-            held: Rc::new((buffers, environment)),
         })
-    }
-
-    /// The same with one triangle an instance, to run pipelines for the first time.
-    pub(super) fn few(&self) -> Self {
-        Self {
-            group: Rc::clone(&self.group),
-            draws: self.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect(),
-            specialization: self.specialization.clone(),
-            metres_per_unit: self.metres_per_unit,
-            held: Rc::clone(&self.held),
-        }
     }
 }
 
@@ -118,7 +104,8 @@ impl Geometry {
                 vertices: 3 * mesh.triangles.len() as u32,
                 sides: Sides {
                     clockwise: object_to_world.matrix3.determinant() < 0.0,
-                    // What is nearest of such a body is a front: leaving out the backs changes nothing but the time.
+                    // What is nearest of such a body is a front, unless it cuts through itself inside out: leaving out the
+                    // backs changes nothing but the time.
                     fronts_only: scene.is_seen_from_outside(object),
                 },
             });
@@ -207,14 +194,14 @@ fn upload_panorama(commands: &mut Commands, panorama: &Panorama) -> Result<Image
         name: "environment",
         width: panorama.width,
         height: panorama.height,
-        format: Format::R32G32B32A32_SFLOAT,
+        format: Format::Rgba32Float,
         uses: &[Use::CopyTarget, Use::Sampled],
     };
     if panorama.texels.iter().flatten().all(is_half) {
         let one = f16::ONE.to_bits();
         let bits = |value: f32| f16::from_f32(value).to_bits();
         let texels: Vec<[u16; 4]> = panorama.texels.iter().map(|&[r, g, b]| [bits(r), bits(g), bits(b), one]).collect();
-        let desc = ImageDesc { format: Format::R16G16B16A16_SFLOAT, ..desc };
+        let desc = ImageDesc { format: Format::Rgba16Float, ..desc };
         return commands.upload_image(&desc, bytemuck::cast_slice(&texels));
     }
     let texels: Vec<[f32; 4]> = panorama.texels.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();

@@ -1,6 +1,6 @@
 //! The original model: a depth-tested forward pass over the objects.
 
-use super::resources::Resources;
+use super::resources::{Draw, Resources};
 use super::{RADIANCE, Targets};
 use crate::gpu::{Depth, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Recorder, Result, SamplePush, Target, shaders};
 
@@ -26,12 +26,19 @@ impl Single {
         Ok(Self { pipeline })
     }
 
-    pub(super) fn record(&self, cmd: &mut Recorder<'_>, resources: &Resources, targets: &Targets, push: SamplePush) {
+    pub(super) fn record<'r>(
+        &'r self,
+        cmd: &mut Recorder<'_, 'r>,
+        resources: &'r Resources,
+        targets: &'r Targets,
+        draws: &[Draw],
+        push: SamplePush,
+    ) {
         let color = Target { image: &targets.radiance, clear: Some([0.0; 4]) };
         let depth = Target { image: &targets.depth, clear: Some([0.0; 4]) };
         cmd.render(&[color], Some(depth), |pass| {
             pass.bind(&self.pipeline, &resources.group);
-            for (instance_index, draw) in (0..).zip(&resources.draws) {
+            for (instance_index, draw) in (0..).zip(draws) {
                 pass.draw(&SamplePush { instance_index, ..push }, draw.vertices, draw.sides);
             }
         });

@@ -2,4 +2,4 @@
 
 mod stats;
 
-pub use stats::{BuildTimes, DeviceStats, Stats};
+pub use stats::{BuildTimes, DeviceStats, PassStats, Run, Stats};

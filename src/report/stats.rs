@@ -65,10 +65,22 @@ pub struct BuildTimes {
     pub pipelines: f64,
 }
 
+/// What is only known when a command ends.
+#[derive(Clone, Copy, Debug)]
+pub struct Run {
+    /// Host time until the scene was read.
+    pub load: Duration,
+    /// Host time of the whole command.
+    pub wall: Duration,
+    /// Most bytes of device memory in use at one time.
+    pub peak_gpu_bytes: u64,
+    /// Messages of the validation layer, if it was there.
+    pub validation_messages: Option<usize>,
+}
+
 impl Stats {
-    /// Those of one render; `load` is the time that it took to read the scene. What is only known at the very end is still
-    /// missing: see [`finish`](Self::finish).
-    pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, load: Duration) -> Self {
+    /// Those of one render.
+    pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, run: Run) -> Self {
         let passes: Vec<_> =
             rendered.passes.iter().map(|&PassTime { name, gpu_ms }| PassStats { name, gpu_ms }).collect();
         let finite = |pixel: &&[f32; 3]| pixel.iter().all(|value| value.is_finite());
@@ -93,22 +105,18 @@ impl Stats {
             gpu_ms: passes.iter().map(|pass| pass.gpu_ms).sum(),
             passes,
             build_ms: BuildTimes {
-                scene: ms(load + rendered.upload),
+                scene: ms(run.load + rendered.upload),
                 acceleration: None,
                 pipelines: ms(rendered.pipelines),
             },
-            wall_ms: 0.0,
+            wall_ms: ms(run.wall),
             rays: None,
-            peak_gpu_bytes: 0,
+            peak_gpu_bytes: run.peak_gpu_bytes,
             discarded: None,
             stderr: None,
             non_finite_pixels: rendered.radiance.len() - rendered.radiance.iter().filter(finite).count(),
-            validation_messages: None,
+            validation_messages: run.validation_messages,
         }
-    }
-    /// The time of the whole run.
-    pub fn finish(&mut self, wall: Duration) {
-        self.wall_ms = ms(wall);
     }
 
     /// One object, readable and ended by a newline.

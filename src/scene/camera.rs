@@ -42,15 +42,16 @@ impl Camera {
         Ok(Self { position, target, up, vertical_fov })
     }
 
-    /// A camera that shows all of `bounds` from the front and slightly above, in any format that is not taller than
-    /// wide.
-    pub fn framing(bounds: Bounds) -> Self {
+    /// A camera that shows all of `bounds` from the front and slightly above, in an image `aspect` times as wide as high.
+    pub fn framing(bounds: Bounds, aspect: f64) -> Self {
         let vertical_fov = DEFAULT_FOV.to_radians();
         let (target, radius) = match bounds.is_empty() {
             true => (DVec3::ZERO, 1.0),
             false => (bounds.center(), bounds.extent().length() * 0.5),
         };
-        let distance = radius * MARGIN / (vertical_fov * 0.5).sin();
+        // The narrower of the two fields of view has to hold it.
+        let half_field = ((vertical_fov * 0.5).tan() * aspect.min(1.0)).atan();
+        let distance = radius * MARGIN / half_field.sin();
         let position = target + DVec3::new(0.0, 0.25, 1.0).normalize() * distance;
         Self { position, target, up: DVec3::Y, vertical_fov }
     }
@@ -79,19 +80,22 @@ mod tests {
             (DVec3::new(5.0, -0.001, -80.0), DVec3::new(5.1, 0.0, 90.0)),
             (DVec3::splat(-1e-4), DVec3::new(1e-4, 7e-4, 1e-4)),
         ] {
-            let camera = Camera::framing(Bounds { min, max });
-            let forward = (camera.target - camera.position).normalize();
-            let right = forward.cross(camera.up).normalize();
-            let up = right.cross(forward);
-            let edge = (camera.vertical_fov * 0.5).tan();
-            for corner in 0..8 {
-                let pick = |bit: usize, axis: usize| if corner >> bit & 1 == 0 { min[axis] } else { max[axis] };
-                let to = DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)) - camera.position;
-                let depth = to.dot(forward);
-                assert!(depth > 0.0);
-                assert!((to.dot(right) / depth).abs() < edge * 0.95 && (to.dot(up) / depth).abs() < edge * 0.95);
+            for aspect in [0.25, 1.0, 2.0] {
+                let camera = Camera::framing(Bounds { min, max }, aspect);
+                let forward = (camera.target - camera.position).normalize();
+                let right = forward.cross(camera.up).normalize();
+                let up = right.cross(forward);
+                let edge = (camera.vertical_fov * 0.5).tan();
+                for corner in 0..8 {
+                    let pick = |bit: usize, axis: usize| if corner >> bit & 1 == 0 { min[axis] } else { max[axis] };
+                    let to = DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2)) - camera.position;
+                    let depth = to.dot(forward);
+                    assert!(depth > 0.0);
+                    assert!((to.dot(right) / depth).abs() < edge * aspect * 0.95, "{aspect}");
+                    assert!((to.dot(up) / depth).abs() < edge * 0.95, "{aspect}");
+                }
+                assert!(camera.position.y > camera.target.y);
             }
-            assert!(camera.position.y > camera.target.y);
         }
     }
 }

@@ -26,11 +26,10 @@ pub(super) fn winding_number(positions: &[[f32; 3]], triangles: &[[u32; 3]], poi
 }
 
 impl Scene {
-    /// Whether the camera sees `object` from its outside only: the mesh is closed, the right way round, and the camera is
-    /// not in the body.
+    /// Whether the camera sees `object` from its outside only: the mesh is closed and the camera is not in the body.
     pub fn is_seen_from_outside(&self, object: &Object) -> bool {
         let mesh = &self.meshes[object.mesh];
-        if !mesh.faults.is_closed() || mesh.faults.inverted_shells > 0 {
+        if !mesh.faults.is_closed() {
             return false;
         }
         let camera = object.transform.inverse().transform_point3(self.camera.position);

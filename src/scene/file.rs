@@ -1,18 +1,18 @@
 //! The TOML scene file. In flow its text and the files it names, out flows a [`Scene`]; what is wrong in it is an error
 //! with file, line and what would be right.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DVec3};
-use serde::Deserialize;
-use toml::de::{DeTable, ValueDeserializer};
+use toml::de::DeTable;
 
 use super::assembly::{Assembly, Placement, Wear, check_mesh_kind};
 use super::camera::DEFAULT_FOV;
 use super::files::Files;
 use super::material::Glass;
 use super::mesh::FARTHEST;
-use super::table::{Document, Entry, FIELD, FINITE, LENGTH, LIGHT, POSITIVE, POSITIVE_OR_INFINITE, SCALE, Table, UNIT};
+use super::table::{Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT};
 use super::{Camera, Dielectric, Material, Opaque, PointLight, Surface, builtin};
 use crate::options::RenderArgs;
 use crate::{Error, Result};
@@ -161,34 +161,37 @@ impl Reader<'_> {
         })
     }
 
+    /// Options of `render`: each value is put as on the command line, so that both know the same ranges.
     fn render(&self, entry: Entry<'_>) -> Result<RenderArgs> {
-        let table = entry.any_table("render")?;
-        let mut args = RenderArgs::deserialize(ValueDeserializer::from(entry.value().clone())).map_err(|error| {
-            let span = error.span().unwrap_or(entry.value().span());
-            let entries = table.entries();
-            let key = entries
-                .iter()
-                .find(|entry| entry.value().span().start <= span.start && span.end <= entry.value().span().end);
-            let message = error.message();
-            // Serde's words for what the other tables say in theirs.
-            let unknown = message.strip_prefix("unknown field ").and_then(|rest| rest.split_once(", expected one of "));
-            let message = match (unknown, key) {
-                (Some((name, allowed)), _) => {
-                    format!(
-                        "unknown key \"{}\" in [render]; allowed here: {}",
-                        name.replace('`', ""),
-                        allowed.replace('`', "")
-                    )
-                }
-                (None, Some(key)) => format!("{}: {message}", key.key),
-                (None, None) => format!("[render]: {message}"),
-            };
-            entry.document.error(span, message.replace('\n', ", "))
-        })?;
-        if let Some(image) = table.get("env") {
-            args.env = Some(self.path(image)?);
+        let names: Vec<_> = RenderArgs::names().iter().map(|name| name.replace('-', "_")).collect();
+        let names: Vec<_> = names.iter().map(String::as_str).collect();
+        let mut all = RenderArgs::default();
+        for entry in entry.table("render", &names)?.entries() {
+            let value = self.option(entry)?;
+            let option = RenderArgs::one(&entry.key.replace('_', "-"), &value);
+            all = option.map_err(|message| entry.error(format!("[render]: {message}")))?.or(all);
         }
-        Ok(args)
+        Ok(all)
+    }
+
+    fn option(&self, entry: Entry<'_>) -> Result<OsString> {
+        let text = match entry.key {
+            "env" => return Ok(self.path(entry)?.into()),
+            "stats" => return Ok(self.folder.join(entry.text("a file name")?).into()),
+            "size" => {
+                entry.integers::<2>("width and height, as in [1024, 768]")?.map(|side| side.to_string()).join("x")
+            }
+            "effects" | "aov" => entry.texts("names, as in \"a,b\" or [\"a\", \"b\"]")?.join(","),
+            "device" => match entry.as_text() {
+                Some(name) => name.to_owned(),
+                None => entry.integer()?.to_string(),
+            },
+            "samples" | "max_depth" | "seed" => entry.integers::<1>("a whole number")?[0].to_string(),
+            "validation" | "flipped_ratio" => entry.boolean()?.to_string(),
+            "model" | "tonemap" | "trace" => entry.text("a name")?.to_owned(),
+            _ => entry.number(&FINITE)?.to_string(),
+        };
+        Ok(text.into())
     }
 
     fn surface(&self, entry: Entry<'_>) -> Result<Surface> {
@@ -259,7 +262,7 @@ fn dielectric(table: &Table<'_>) -> Result<Surface> {
     let clear = Dielectric::default();
     let ior = |entry: Entry<'_>| match entry.as_text() {
         Some(name) => Glass::named(name).map(|glass| glass.ior).map_err(|message| entry.error(message)),
-        None => entry.number(&POSITIVE),
+        None => entry.number(&INDEX),
     };
     Ok(Surface::Dielectric(Dielectric {
         ior: table.or("ior", clear.ior, ior)?,

@@ -37,7 +37,7 @@ pub struct MeshFaults {
     pub non_manifold_edges: usize,
     /// Edges whose triangles do not agree on where the outside is.
     pub inconsistent_edges: usize,
-    /// Closed shells that are turned inside out and are no cavity of another.
+    /// Closed shells that were inside out and no cavity of another; they were turned.
     pub inverted_shells: usize,
     /// Triangles without an area, which were removed.
     pub degenerate_triangles: usize,
@@ -57,7 +57,7 @@ pub enum Refusal {
         /// How many there were before those without an area were removed.
         degenerate: usize,
     },
-    /// Vertices that are NaN, infinite or farther away than [`FARTHEST`].
+    /// Vertices that are NaN, infinite or farther away than 1e9.
     BadVertices {
         /// How many.
         count: usize,
@@ -117,7 +117,7 @@ impl fmt::Display for MeshFaults {
             (self.open_edges, "open edge", "open edges"),
             (self.non_manifold_edges, "non-manifold edge", "non-manifold edges"),
             (self.inconsistent_edges, "edge of inconsistent orientation", "edges of inconsistent orientation"),
-            (self.inverted_shells, "shell inside out", "shells inside out"),
+            (self.inverted_shells, "shell inside out turned", "shells inside out turned"),
             (self.degenerate_triangles, "degenerate triangle removed", "degenerate triangles removed"),
             (self.unused_vertices, "unused vertex", "unused vertices"),
             (self.replaced_normals, "normal replaced", "normals replaced"),
@@ -156,7 +156,13 @@ impl Mesh {
         if let Some(first) = triangles.iter().position(bad) {
             return Err(Refusal::BadIndices { count: triangles.iter().filter(|t| bad(t)).count(), first, vertices });
         }
-        topology::analyse(&positions, &triangles, &mut faults);
+        let turned = topology::analyse(&positions, &triangles, &mut faults);
+        let mut inverted = vec![false; if turned.is_empty() { 0 } else { vertices }];
+        for number in turned {
+            let triangle = &mut triangles[number as usize];
+            triangle.swap(1, 2);
+            triangle.iter().for_each(|&vertex| inverted[vertex as usize] = true);
+        }
         let all = triangles.len();
         // As 32-bit numbers: what underflows there has no normal.
         triangles.retain(|&triangle| area_vector(&positions, triangle).as_vec3() != Vec3::ZERO);
@@ -171,6 +177,7 @@ impl Mesh {
         if mesh.normals.len() != vertices {
             mesh.normals.clear();
         }
+        mesh.turn_normals(&inverted);
         mesh.mend_normals(&used);
         Ok(mesh)
     }
@@ -178,6 +185,19 @@ impl Mesh {
     /// The box around the mesh in its own space.
     pub fn bounds(&self) -> Bounds {
         Bounds::around_positions(&self.positions, &DAffine3::IDENTITY)
+    }
+
+    /// Normals of vertices in `which` follow the faces around, should they point the other way.
+    fn turn_normals(&mut self, which: &[bool]) {
+        if self.normals.is_empty() || which.is_empty() {
+            return;
+        }
+        let mean = mean_normals(&self.positions, &self.triangles);
+        for ((normal, mean), _) in self.normals.iter_mut().zip(mean).zip(which).filter(|(_, which)| **which) {
+            if DVec3::from_array(normal.map(f64::from)).dot(mean) < 0.0 {
+                *normal = normal.map(|x| -x);
+            }
+        }
     }
 
     fn mend_normals(&mut self, used: &[bool]) {
@@ -311,8 +331,26 @@ mod tests {
         assert!(shells(&[(1.0, 0.0, false), (0.25, 0.125, true)]).is_empty());
         // Beside the body, though inside its box.
         assert_eq!(shells(&[(1.0, 0.0, false), (0.25, 0.625, true)]).inverted_shells, 1);
-        assert_eq!(shells(&[(1.0, 0.0, true), (0.25, 0.125, false)]).inverted_shells, 1);
-        assert_eq!(shells(&[(1.0, 0.0, true), (1.0, 5.0, true)]).to_string(), "2 shells inside out");
+        // A body with a cavity, all of it inside out.
+        assert_eq!(shells(&[(1.0, 0.0, true), (0.25, 0.125, false)]).inverted_shells, 2);
+        assert_eq!(shells(&[(1.0, 0.0, true), (1.0, 5.0, true)]).to_string(), "2 shells inside out turned");
+    }
+
+    #[test]
+    fn bodies_inside_out_are_turned_and_their_normals_with_them() {
+        let inward = OUTWARD.map(|[a, b, c]| [a, c, b]);
+        let away = |sign: f32| TETRAHEDRON.map(|p| p.map(|x| sign * (x - 0.25)));
+        for normals in [away(1.0), away(-1.0)] {
+            let turned = mesh(&TETRAHEDRON, &normals, &inward).unwrap();
+            assert_eq!(turned.faults, MeshFaults { inverted_shells: 1, ..MeshFaults::default() });
+            let volume: f64 = turned.triangles.iter().map(|&t| area_vector(&TETRAHEDRON, t).dot(center(t))).sum();
+            assert!(volume > 0.0);
+            assert!(turned.normals.iter().zip(away(1.0)).all(|(n, away)| Vec3::from(*n).dot(away.into()) > 0.0));
+        }
+    }
+
+    fn center(triangle: [u32; 3]) -> DVec3 {
+        triangle.iter().map(|&i| DVec3::from_array(TETRAHEDRON[i as usize].map(|x| f64::from(x) - 0.25))).sum()
     }
 
     #[test]

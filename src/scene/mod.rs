@@ -45,6 +45,8 @@ pub struct Scene {
     pub environment: Environment,
     /// Where it is seen from.
     pub camera: Camera,
+    /// The camera was not given: [`Scene::frame`] may move it.
+    pub framed: bool,
     /// Point lights.
     pub lights: Vec<PointLight>,
     /// Materials, each with its name.
@@ -113,6 +115,7 @@ impl Scene {
         match extension.as_deref() {
             Some("toml") => Self::from_file(file::read(Files::Disk, path)?, name, overrides),
             Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path)?, name, overrides),
+            _ if path.is_dir() => Err(Error::input(path, 0, "is a folder; name a .toml (scene) or .obj (mesh) in it")),
             _ => Err(Error::input(path, 0, "is no scene of a known kind; known: .toml (scene), .obj (mesh)")),
         }
     }
@@ -124,7 +127,8 @@ impl Scene {
             roughness: overrides.roughness.or(render.roughness),
             environment: overrides.environment.clone().or_else(|| render.env.clone()),
         };
-        let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds()));
+        let framed = camera.is_none();
+        let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
         let Assembly { meshes, objects, mut materials, mut warnings, .. } = assembly;
         for material in &mut materials {
             if let Surface::Dielectric(dielectric) = &mut material.surface {
@@ -138,7 +142,14 @@ impl Scene {
             Light::Color(color) => Surroundings::Color(color),
         };
         let environment = Environment { light, intensity, rotation, visible };
-        Ok(Self { name, environment, camera, lights, materials, meshes, objects, render, warnings })
+        Ok(Self { name, environment, camera, framed, lights, materials, meshes, objects, render, warnings })
+    }
+
+    /// Moves a camera that was not given, so that an image that is `aspect` times as wide as high shows all objects.
+    pub fn frame(&mut self, aspect: f64) {
+        if self.framed {
+            self.camera = Camera::framing(self.bounds().unwrap_or(Bounds::EMPTY), aspect);
+        }
     }
 
     /// The box around `object` in the world.
@@ -170,8 +181,10 @@ fn bare_mesh(path: &Path) -> Result<SceneFile> {
 
 impl Overrides {
     fn check(&self) -> Result<()> {
-        if let Some(ior) = self.ior.filter(|ior| !(*ior > 0.0 && (*ior as f32).is_normal())) {
-            return Err(Error::Usage(format!("index of refraction {ior}: expected a number above 0")));
+        if let Some(ior) = self.ior.filter(|ior| !(1e-6..=1e6).contains(ior)) {
+            return Err(Error::Usage(format!(
+                "index of refraction {ior}: expected a number above 0, from 1e-6 to 1e6"
+            )));
         }
         if let Some(roughness) = self.roughness.filter(|roughness| !(0.0..=1.0).contains(roughness)) {
             return Err(Error::Usage(format!("roughness {roughness}: expected a number from 0 to 1")));

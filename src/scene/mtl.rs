@@ -161,6 +161,11 @@ impl Converter<'_> {
         let clear = Dielectric::default();
         let ior = match self.material.optical_density {
             None | Some(0.0) => clear.ior,
+            // No index at all: what is meant cannot be guessed from it.
+            Some(ior) if ior < 0.0 || ior.is_nan() => {
+                self.remark(&format!("Ni {ior} is no index of refraction; {} is used", clear.ior));
+                clear.ior
+            }
             Some(ior) => self.within("Ni", ior.into(), 0.001, 10.0, clear.ior),
         };
         let roughness =

@@ -61,6 +61,9 @@ pub const POSITIVE: Rule = Rule { wanted: "a number above 0", holds: |x| x > 0.0
 /// As [`POSITIVE`], or infinity.
 pub const POSITIVE_OR_INFINITE: Rule =
     Rule { wanted: "a number above 0, or inf", holds: |x| x == f64::INFINITY || (POSITIVE.holds)(x) };
+/// An index of refraction; what lies beyond has squares that 32 bits do not hold.
+pub const INDEX: Rule =
+    Rule { wanted: "a number above 0, from 1e-6 to 1e6, or the name of a glass", holds: |x| (1e-6..=1e6).contains(&x) };
 /// From 0 to 1.
 pub const UNIT: Rule = Rule { wanted: "a number from 0 to 1", holds: |x| (0.0..=1.0).contains(&x) };
 /// Radiance, intensity and their factors.
@@ -181,11 +184,6 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// The plain value, for serde.
-    pub fn value(&self) -> &'a Spanned<DeValue<'a>> {
-        self.value
-    }
-
     fn as_number(&self) -> Option<f64> {
         match self.value.get_ref() {
             DeValue::Float(number) => number.as_str().parse().ok(),
@@ -222,13 +220,37 @@ impl<'a> Entry<'a> {
         }
     }
 
+    fn as_integer(&self) -> Option<i64> {
+        match self.value.get_ref() {
+            DeValue::Integer(number) => i64::from_str_radix(number.as_str(), number.radix()).ok(),
+            _ => None,
+        }
+    }
+
     /// A whole number of 32 bits.
     pub fn integer(&self) -> Result<i32> {
-        let integer = match self.value.get_ref() {
-            DeValue::Integer(number) => i32::from_str_radix(number.as_str(), number.radix()).ok(),
-            _ => None,
-        };
+        let integer = self.as_integer().and_then(|integer| integer.try_into().ok());
         integer.ok_or_else(|| self.unexpected("a whole number from -2147483648 to 2147483647"))
+    }
+
+    /// A whole number, or an array of `N` where `N` is not 1.
+    pub fn integers<const N: usize>(&self, wanted: &str) -> Result<[i64; N]> {
+        let integers: Option<Vec<i64>> = match self.value.get_ref() {
+            DeValue::Array(array) if N != 1 => {
+                array.iter().map(|value| Entry { value, ..*self }.as_integer()).collect()
+            }
+            _ => self.as_integer().map(|integer| vec![integer]),
+        };
+        integers.and_then(|integers| integers.try_into().ok()).ok_or_else(|| self.unexpected(wanted))
+    }
+
+    /// A text, or several.
+    pub fn texts(&self, wanted: &str) -> Result<Vec<&'a str>> {
+        let texts: Option<Vec<&str>> = match self.value.get_ref() {
+            DeValue::Array(array) => array.iter().map(|value| value.get_ref().as_str()).collect(),
+            _ => self.as_text().map(|text| vec![text]),
+        };
+        texts.ok_or_else(|| self.unexpected(wanted))
     }
 
     /// True or false.

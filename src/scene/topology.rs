@@ -18,22 +18,28 @@ const MOST_PAIRS: usize = 100_000_000;
 /// A welded, connected piece of a surface.
 struct Shell {
     triangles: Vec<[u32; 3]>,
+    /// Where in the mesh they come from.
+    numbers: Vec<u32>,
     bounds: Bounds,
     closed: bool,
     volume: f64,
 }
 
-/// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`.
-pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut MeshFaults) {
+/// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`. Returns the triangles of the inverted
+/// shells, by their numbers.
+pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Vec<u32> {
     let welded = weld(positions);
     // A triangle that welding folds up has edges that cancel out.
-    let triangles: Vec<[u32; 3]> = triangles
-        .iter()
-        .map(|triangle| triangle.map(|vertex| welded[vertex as usize]))
-        .filter(|[a, b, c]| a != b && b != c && c != a)
-        .collect();
+    let (numbers, triangles): (Vec<u32>, Vec<[u32; 3]>) = (0..)
+        .zip(triangles)
+        .map(|(number, triangle)| (number, triangle.map(|vertex| welded[vertex as usize])))
+        .filter(|(_, [a, b, c])| a != b && b != c && c != a)
+        .unzip();
     let faulty = faulty_edges(&triangles, faults);
-    faults.inverted_shells = inverted_shells(&shells(positions, triangles, &faulty), positions);
+    let shells = shells(positions, &numbers, triangles, &faulty);
+    let inverted = inverted_shells(&shells, positions);
+    faults.inverted_shells = inverted.len();
+    inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect()
 }
 
 /// For each vertex the first one, in the order of their bits, at the same place.
@@ -83,7 +89,7 @@ fn faulty_edges(triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Vec<u32> {
     faulty
 }
 
-fn shells(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, faulty: &[u32]) -> Vec<Shell> {
+fn shells(positions: &[[f32; 3]], numbers: &[u32], triangles: Vec<[u32; 3]>, faulty: &[u32]) -> Vec<Shell> {
     let mut parent: Vec<u32> = (0..positions.len() as u32).collect();
     fn root(parent: &mut [u32], mut vertex: u32) -> u32 {
         while parent[vertex as usize] != vertex {
@@ -101,13 +107,21 @@ fn shells(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, faulty: &[u32]) -> V
     }
     let mut number = vec![u32::MAX; positions.len()];
     let mut shells: Vec<Shell> = Vec::new();
-    for triangle in triangles {
+    for (triangle, &origin) in triangles.into_iter().zip(numbers) {
         let root = root(&mut parent, triangle[0]) as usize;
         if number[root] == u32::MAX {
             number[root] = shells.len() as u32;
-            shells.push(Shell { triangles: Vec::new(), bounds: Bounds::EMPTY, closed: true, volume: 0.0 });
+            shells.push(Shell {
+                triangles: Vec::new(),
+                numbers: Vec::new(),
+                bounds: Bounds::EMPTY,
+                closed: true,
+                volume: 0.0,
+            });
         }
-        shells[number[root] as usize].triangles.push(triangle);
+        let shell = &mut shells[number[root] as usize];
+        shell.triangles.push(triangle);
+        shell.numbers.push(origin);
     }
     for &vertex in faulty {
         let root = root(&mut parent, vertex) as usize;
@@ -126,13 +140,18 @@ fn shells(positions: &[[f32; 3]], triangles: Vec<[u32; 3]>, faulty: &[u32]) -> V
     shells
 }
 
-/// Closed shells whose inside lies outside: negative volume, and not a cavity of a shell around them.
-fn inverted_shells(shells: &[Shell], positions: &[[f32; 3]]) -> usize {
+/// Closed shells whose inside lies outside: all of them where their volumes add up to less than nothing, else those of
+/// negative volume that are no cavity of a shell around them.
+fn inverted_shells<'a>(shells: &'a [Shell], positions: &[[f32; 3]]) -> Vec<&'a Shell> {
     let flat = |shell: &Shell| -1e-9 * shell.bounds.extent().max_element().powi(3);
     let inside_out: Vec<_> = shells.iter().filter(|shell| shell.closed && shell.volume < flat(shell)).collect();
+    let closed = || shells.iter().filter(|shell| shell.closed);
+    if !inside_out.is_empty() && closed().map(|shell| shell.volume).sum::<f64>() < 0.0 {
+        return closed().collect();
+    }
     let solids: Vec<_> = shells.iter().filter(|shell| shell.closed && shell.volume > 0.0).collect();
     if inside_out.len() * solids.len() > MOST_PAIRS {
-        return inside_out.len();
+        return inside_out;
     }
     let mut budget = WINDING_BUDGET;
     let mut is_cavity = |shell: &Shell| {
@@ -144,7 +163,7 @@ fn inverted_shells(shells: &[Shell], positions: &[[f32; 3]]) -> usize {
         });
         winding.sum::<f64>() > 0.5
     };
-    inside_out.iter().filter(|shell| !is_cavity(shell)).count()
+    inside_out.into_iter().filter(|shell| !is_cavity(shell)).collect()
 }
 
 fn place(positions: &[[f32; 3]], vertex: u32) -> DVec3 {

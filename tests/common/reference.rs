@@ -127,7 +127,8 @@ impl<'a> Reference<'a> {
             panic!("the original knows no opaque surface");
         };
         let view_dir = -direction;
-        let fresnel = original::fresnel_bsdf(hit.normal.dot(view_dir), 1.0, glass.ior);
+        // From behind the original reflects more than everything; a picture holds no less than no light.
+        let fresnel = original::fresnel_bsdf(hit.normal.dot(view_dir), 1.0, glass.ior).min(1.0);
         let reflection = self.environment(original::reflection_dir(view_dir, hit.normal));
         let transmission = original::transmission_dir(view_dir, hit.normal, glass.ior, flipped)
             .map_or(DVec3::ZERO, |direction| self.environment(direction));

@@ -130,7 +130,7 @@ fn a_scene_that_says_little_gets_the_defaults() {
     assert_eq!(dielectric(&scene, 0), &Dielectric::default());
     assert!(matches!(&scene.environment.light, Surroundings::Image(panorama) if panorama.width == 512));
     assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
-    assert_eq!(scene.camera, vitrum::scene::Camera::framing(scene.bounds().unwrap()));
+    assert_eq!(scene.camera, vitrum::scene::Camera::framing(scene.bounds().unwrap(), 1.0));
     let empty = folder.scene("").unwrap();
     assert!(empty.objects.is_empty() && empty.bounds().is_none());
     let color = folder.scene("[environment]\ncolor = [1, 0.5, 0]").unwrap();
@@ -189,12 +189,30 @@ fn values_of_the_wrong_type_or_range_say_what_is_expected() {
     let matt = "[material.m]\nkind = \"opaque\"\n";
     let object = "[[object]]\nmesh = \"body.obj\"\n";
     let cases = [
-        (format!("{head}ior = 0"), "3: ior: expected a number above 0, found 0"),
-        (format!("{head}ior = -1.5"), "3: ior: expected a number above 0, found -1.5"),
-        (format!("{head}ior = nan"), "3: ior: expected a number above 0, found nan"),
-        (format!("{head}ior = inf"), "3: ior: expected a number above 0, found inf"),
-        (format!("{head}ior = 1e99"), "3: ior: expected a number above 0, found 1e99"),
-        (format!("{head}ior = [1.5]"), "3: ior: expected a number above 0, found an array of 1"),
+        (
+            format!("{head}ior = 0"),
+            "3: ior: expected a number above 0, from 1e-6 to 1e6, or the name of a glass, found 0",
+        ),
+        (
+            format!("{head}ior = -1.5"),
+            "3: ior: expected a number above 0, from 1e-6 to 1e6, or the name of a glass, found -1.5",
+        ),
+        (
+            format!("{head}ior = nan"),
+            "3: ior: expected a number above 0, from 1e-6 to 1e6, or the name of a glass, found nan",
+        ),
+        (
+            format!("{head}ior = inf"),
+            "3: ior: expected a number above 0, from 1e-6 to 1e6, or the name of a glass, found inf",
+        ),
+        (
+            format!("{head}ior = 1e99"),
+            "3: ior: expected a number above 0, from 1e-6 to 1e6, or the name of a glass, found 1e99",
+        ),
+        (
+            format!("{head}ior = [1.5]"),
+            "3: ior: expected a number above 0, from 1e-6 to 1e6, or the name of a glass, found an array of 1",
+        ),
         (format!("{head}roughness = 1.01"), "3: roughness: expected a number from 0 to 1, found 1.01"),
         (format!("{head}roughness = true"), "3: roughness: expected a number from 0 to 1, found true"),
         (format!("{head}roughness = \"low\""), "3: roughness: expected a number from 0 to 1, found \"low\""),
@@ -325,13 +343,27 @@ fn materials_of_objects_must_exist() {
 #[test]
 fn render_options_are_checked_and_named() {
     let folder = Folder::new();
-    assert!(
-        folder.fault("[render]\nsamples = 0").starts_with("2: samples: "),
-        "{}",
-        folder.fault("[render]\nsamples = 0")
-    );
-    assert!(folder.fault("[render]\nmodel = \"fast\"").contains("unknown variant `fast`, expected one of `single`"));
-    assert!(folder.fault("[render]\nsize = [0, 4]").starts_with("2: size: "));
+    for (option, wanted) in [
+        ("samples = 0", "--samples <N>': expected 1 to 1048576 samples"),
+        ("samples = \"9\"", "samples: expected a whole number, found \"9\""),
+        ("model = \"fast\"", "possible values: single"),
+        ("model = 1", "model: expected a name, found 1"),
+        ("size = [0, 4]", "at least 1"),
+        ("size = [9, 4, 2]", "size: expected width and height, as in [1024, 768], found an array of 3"),
+        ("exposure = true", "exposure: expected a finite number, found true"),
+        ("aov = [1]", "aov: expected names"),
+        ("flipped_ratio = 1", "flipped_ratio: expected true or false, found 1"),
+        ("speed = 1", "unknown key \"speed\" in [render]; allowed here: model, size, samples"),
+    ] {
+        let fault = folder.fault(&format!("[render]\n{option}"));
+        assert!(fault.starts_with("2: ") && fault.contains(wanted), "{option}: {fault}");
+    }
+    let good = "size = [9, 4]\nexposure = 1\naov = [\"depth\", \"normal\"]\neffects = [\"auto\", \"-nesting\"]\ndevice = 0\n\
+        seed = 7\nvalidation = true\nstats = \"a.json\"\ntime_budget = 2\n";
+    let render = folder.scene(&format!("[render]\n{good}")).unwrap().render;
+    assert_eq!(render.stats, Some(folder.path("a.json")));
+    let options = "--size=9x4 --time-budget=2 --seed=7 --effects=auto,-nesting --exposure=1 --aov=depth,normal";
+    assert_eq!((render.to_string().as_str(), render.validation), (options, Some(true)));
     assert!(folder.fault("render = 4").contains("expected a table, [render], found 4"));
     assert!(folder.fault("[render]\neffects = \"fog\"").contains("unknown effect \"fog\""));
     assert_eq!(folder.fault("[render]\nenv = \"none.exr\""), "2: env: \"none.exr\" does not exist");

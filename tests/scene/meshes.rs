@@ -25,7 +25,7 @@ fn what_is_wrong_with_a_mesh_is_told_with_counts() {
             .replace("f 1 4 3", "f 1 3 4")
             .replace("f 2 3 4", "f 2 4 3"),
     );
-    assert_eq!(inverted.unwrap().warnings[0], "mesh.obj: 1 shell inside out");
+    assert_eq!(inverted.unwrap().warnings[0], "mesh.obj: 1 shell inside out turned");
     for (text, expected) in [
         (TETRAHEDRON.replace("v 0 1 0", "v 0 nan 0"), "mesh.obj:3: vertex coordinate nan: coordinates must be finite"),
         (TETRAHEDRON.replace("v 0 1 0", "v 0 1e39 inf"), "mesh.obj:3: vertex coordinate 1e39"),
@@ -132,7 +132,7 @@ fn mtl_values_are_converted_or_remarked_on() {
     assert_eq!(ior(""), (1.5, 0));
     assert_eq!(ior("Ni 0"), (1.5, 0));
     assert_eq!(ior("Ni 1"), (1.0, 0));
-    assert_eq!(ior("Ni -2"), (0.001, 1));
+    assert_eq!(ior("Ni -2"), (1.5, 1));
     assert_eq!(ior("Ni inf"), (10.0, 1));
     assert_eq!(ior("Ni nan"), (1.5, 1));
     assert_eq!(ior("Tf 0 0 0"), (1.5, 1));
