@@ -12,7 +12,7 @@ void main()
 {
     vec3 ray = CameraRay(gl_FragCoord.xy + jitter);
     Instance instance = instances[instanceIndex];
-    Hit hit = IntersectCameraRay(instance, inTriangle, ray, gl_FrontFacing);
+    Hit hit = IntersectCameraRay(instance, inTriangle, ray);
     outNormalDepth = vec4(hit.normal, hit.t * length(ray));
     outObject = vec4(instance.number, 0.0, 0.0, 0.0);
 }

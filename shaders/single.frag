@@ -13,7 +13,7 @@ void main()
     vec3 ray = CameraRay(gl_FragCoord.xy + jitter);
     Instance instance = instances[instanceIndex];
     Material material = materials[instance.material];
-    Hit hit = IntersectCameraRay(instance, inTriangle, ray, gl_FrontFacing);
+    Hit hit = IntersectCameraRay(instance, inTriangle, ray);
 
     SurfaceData data;
     data.normal = hit.normal;

@@ -5,9 +5,6 @@
 
 #include "shared.glsl"
 
-// The least cosine between the viewer and the normal of a front.
-const float HORIZON = 1e-3;
-
 struct Hit {
     float t;        // in lengths of the ray's direction
     vec3 position;
@@ -31,8 +28,7 @@ uvec3 FetchTriangle(Instance instance, uint triangle)
 }
 
 // Where the camera's ray along `direction` meets the plane of `triangle`: Moeller & Trumbore 1997, in the mesh's space.
-// `front`: the triangle shows its outside.
-Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction, bool front)
+Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
 {
     uvec3 vertices = FetchTriangle(instance, triangle);
     vec3 corner = FetchPosition(vertices.x);
@@ -58,11 +54,6 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction, bool fr
         vec3 first = FetchNormal(vertices.x);
         normal = normalize(first + b1 * (FetchNormal(vertices.y) - first) + b2 * (FetchNormal(vertices.z) - first));
     }
-    // At silhouettes an interpolated normal may face away from the viewer although its face does not, and so may a rounded
-    // one of the face itself: it is bent to just above the horizon.
-    vec3 towards = -normalize(ray);
-    float cosine = dot(normal, towards);
-    if (front && cosine < HORIZON) normal += (HORIZON - cosine) * towards;
     hit.normal = normalize(mat3(instance.normalToWorld) * normal);
     return hit;
 }

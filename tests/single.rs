@@ -380,6 +380,30 @@ fn debug_controls_do_what_the_report_says() {
     near(centre(only("transmission")), [transmitted; 3]);
 }
 
+/// Edges move with the rays when samples are jittered: the share of a pixel that a body covers is that of its rays.
+#[test]
+fn edges_cover_what_the_rays_of_a_pixel_see() {
+    let mut scene = scene(BALL, &Overrides::default());
+    scene.environment.light = Surroundings::Color(DVec3::ONE);
+    // A black body.
+    let dark = Some(0.0);
+    let args =
+        RenderArgs { samples: Some(64), transmission_intensity: dark, reflection_intensity: dark, ..sized(32, 24) };
+    let Some((plan, rendered)) = picture(&scene, args) else { return };
+    let reference = Reference::new(&scene, plan.size);
+    let mut edges = 0;
+    for (i, pixel) in rendered.radiance.iter().enumerate() {
+        let corner = DVec2::new((i % 32) as f64, (i / 32) as f64);
+        let offset = |step: usize| (step as f64 + 0.5) / 10.0;
+        let rays = (0..100).map(|j| reference.ray(corner + DVec2::new(offset(j % 10), offset(j / 10))));
+        let covered = rays.filter(|&ray| reference.hit(ray).is_some()).count() as f64 / 100.0;
+        let found = 1.0 - f64::from(pixel[0]);
+        assert!((found - covered).abs() < 0.08, "pixel {i}: {found} covered, expected {covered}");
+        edges += usize::from(covered > 0.0 && covered < 1.0);
+    }
+    assert!(edges > 20, "{edges}");
+}
+
 /// A sum of many samples would lose a share of each to rounding.
 #[test]
 fn the_mean_of_many_samples_stays_exact() {
