@@ -134,14 +134,10 @@ impl RenderCommand {
     /// An output must not replace an input, nor another output.
     fn keep_apart(&self, output: &OutputFile, stats: Option<&OutputFile>, options: &RenderArgs) -> Result<()> {
         let inputs = [self.scene.as_deref(), options.env.as_deref()];
-        for input in inputs.into_iter().flatten() {
-            for file in [Some(output), stats].into_iter().flatten().filter(|file| file.replaces(input)) {
-                return Err(Error::input(
-                    file.path(),
-                    0,
-                    "is read by this render and would be replaced; name another file",
-                ));
-            }
+        let is_input = |file: &OutputFile| inputs.into_iter().flatten().any(|input| file.replaces(input));
+        if let Some(file) = [Some(output), stats].into_iter().flatten().find(|file| is_input(file)) {
+            let message = "is read by this render and would be replaced; name another file";
+            return Err(Error::input(file.path(), 0, message));
         }
         match stats {
             Some(stats) if output.replaces(stats.path()) => {

@@ -62,7 +62,7 @@ impl BindGroup {
             kinds,
             pool: vk::DescriptorPool::null(),
             gpu: gpu.clone(),
-            resources: resources,
+            resources,
         };
         let layout = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
         let pool = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);

@@ -97,7 +97,7 @@ pub(super) struct Pipeline {
 impl Pipeline {
     /// Its layout; the pipeline itself is still missing.
     fn new(gpu: &Gpu, group: &BindGroup, push_bytes: u32) -> Result<Self> {
-        assert!(push_bytes <= MAX_PUSH_BYTES && push_bytes % 4 == 0, "{push_bytes} bytes of push constants");
+        assert!(push_bytes <= MAX_PUSH_BYTES && push_bytes.is_multiple_of(4), "{push_bytes} bytes of push constants");
         let sets = [group.layout];
         let ranges = [vk::PushConstantRange { stage_flags: PUSH_STAGES, offset: 0, size: push_bytes }];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&sets);

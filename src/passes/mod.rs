@@ -30,6 +30,7 @@ use resources::{Draw, Resources};
 use single::Single;
 
 pub use aov::Aovs;
+pub use sampling::pixel_offsets;
 
 /// Radiance in flight, and means of it.
 const RADIANCE: Format = Format::Rgba32Float;

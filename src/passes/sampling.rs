@@ -11,11 +11,11 @@ const GOLDEN: f64 = 0.618_033_988_749_894_9;
 /// Quasirandom Sequences", 2018).
 const PLASTIC: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053_3);
 
-/// Offsets from the pixel's centre, each within half a pixel. The same in every pixel: a frame is jittered as a whole.
+/// Offsets from the pixel's centre in pixels, x to the right and y down, each within half a pixel. The same in every pixel: a frame is jittered as a whole.
 ///
 /// With a known number of samples they form a lattice, else a sequence; a single sample lies at the centre. A seed
 /// other than 0 moves them all, around the pixel's edges.
-pub(super) fn pixel_offsets(budget: Budget, seed: u64) -> Box<dyn Iterator<Item = DVec2>> {
+pub fn pixel_offsets(budget: Budget, seed: u64) -> Box<dyn Iterator<Item = DVec2>> {
     let shift = shift(seed);
     let place = move |point: DVec2| (point + shift).fract_gl() - 0.5;
     match budget {
