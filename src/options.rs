@@ -7,7 +7,7 @@ use std::str::FromStr;
 
 use clap::{Args as _, FromArgMatches as _};
 
-use crate::effects::Selection;
+use crate::effects::{Effect, Selection};
 
 /// A light transport model: how far the light is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -203,7 +203,7 @@ pub struct RenderArgs {
     pub seed: Option<u64>,
 
     /// Effects simulated: auto (those that the scene calls for), all, or a list; -name takes one away [default: auto]
-    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true, long_help = effects_help())]
     pub effects: Option<Selection>,
 
     /// Index of refraction of every dielectric
@@ -349,6 +349,15 @@ impl Display for RenderArgs {
         }
         Ok(())
     }
+}
+
+fn effects_help() -> String {
+    let names: Vec<_> = Effect::all().map(Effect::name).collect();
+    format!(
+        "Effects simulated: auto (those that the scene calls for), all, or a list; -name takes one away \
+         [default: auto]\n\nEffects: {}",
+        names.join(", ")
+    )
 }
 
 /// What clap has to say, without its layout: the message, what is possible, and where to read on.

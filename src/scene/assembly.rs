@@ -143,7 +143,7 @@ impl Assembly {
 pub fn check_mesh_kind(path: &Path) -> Result<(), String> {
     match path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase()).as_deref() {
         Some("obj") => Ok(()),
-        Some("glb" | "gltf") => Err(format!("{:?}: glTF is not read yet; convert to .obj", path.display().to_string())),
-        _ => Err(format!("{:?} is no mesh of a known kind; known: .obj", path.display().to_string())),
+        Some("glb" | "gltf") => Err("glTF is not read yet; convert to .obj".into()),
+        _ => Err("is no mesh of a known kind; known: .obj".into()),
     }
 }

@@ -226,7 +226,8 @@ impl Reader<'_> {
         let table = entry.table("[object]", &["mesh", "material", "translate", "rotate", "scale", "smooth"])?;
         let mesh = table.require("mesh")?;
         let path = self.path(mesh)?;
-        check_mesh_kind(&path).map_err(|message| mesh.error(format!("mesh: {message}")))?;
+        let name = path.display().to_string();
+        check_mesh_kind(&path).map_err(|message| mesh.error(format!("mesh {name:?}: {message}")))?;
         let wear = table.or("material", Wear::Own, |entry| material_number(entry, materials).map(Wear::Material))?;
         let translate = table.or("translate", DVec3::ZERO, |entry| entry.triple(&LENGTH))?;
         let degrees = table.or("rotate", DVec3::ZERO, |entry| entry.triple(&FINITE))?;
