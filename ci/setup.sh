@@ -130,14 +130,14 @@ join_archives() {
     } | ar -M >/dev/null 2>&1 && shaderc_works "$to" -lshaderc_combined
 }
 
-# The sources that the shaderc-sys crate carries: about twenty minutes of processor time, once a machine.
+# The sources that the shaderc-sys crate carries: more than ten minutes of processor time, once a machine.
 build_shaderc() {
     local to=$1 source
     install cmake ninja-build git python3
     source=$(cd "$root" && cargo metadata --format-version 1 --locked | tr ',' '\n' |
         sed -n 's|.*"manifest_path":"\(.*/shaderc-sys-[^/]*\)/Cargo.toml".*|\1|p' | head -n 1)
     [ -d "$source/build" ] || fail "the sources of shaderc-sys are not where cargo says: '$source'"
-    say "building shaderc from source (some twenty minutes, once)"
+    say "building shaderc from source (some ten minutes, once)"
     cmake -S "$source/build" -B "$work/shaderc" -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_POSITION_INDEPENDENT_CODE=ON \
         -DENABLE_GLSLANG_BINARIES=OFF -DSHADERC_SKIP_TESTS=ON -DSPIRV_SKIP_EXECUTABLES=ON -DSPIRV_WERROR=OFF >"$work/cmake.log" 2>&1 &&
         cmake --build "$work/shaderc" --target shaderc_combined-pkg-config shaderc_combined >>"$work/cmake.log" 2>&1 ||
@@ -192,7 +192,7 @@ if ! command -v apt-get >/dev/null; then
 setup: no apt-get here. Vitrum needs, from this system's own packages:
   - Rust (rustup), a C++ compiler
   - shaderc with its static library; put its folder into SHADERC_LIB_DIR ("$VULKAN_SDK/lib" with the Vulkan SDK),
-    or leave it out and have cmake, git and python3: cargo then builds shaderc, once, in some twenty minutes
+    or leave it out and have cmake, git and python3: cargo then builds shaderc, once, in some ten minutes
   - the Vulkan loader and a driver (lavapipe, or a GPU's; MoltenVK on macOS), and for tests VK_LAYER_KHRONOS_validation
 TEXT
     exit 1
