@@ -57,13 +57,6 @@ impl Budget {
             Self::Seconds { seconds, most } => Self::Seconds { seconds: seconds - spent.as_secs_f64(), most },
         }
     }
-
-    /// The most samples that it allows.
-    pub fn most(self) -> u32 {
-        match self {
-            Self::Samples(most) | Self::Seconds { most, .. } => most,
-        }
-    }
 }
 
 /// Samples that a time budget ends with at the latest.

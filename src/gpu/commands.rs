@@ -237,40 +237,31 @@ impl<'r> Recorder<'_, 'r> {
 
     /// Waits for the last use of `image`, then makes it ready for `next`.
     pub fn use_image(&mut self, image: &'r Image, next: Use) {
-        self.change_use(image, image.replace_use(next), next);
+        let before = image.replace_use(next);
+        self.barrier(image, before, before.layout(), next);
     }
 
     /// As [`use_image`](Self::use_image), for a use that overwrites all of the content.
     pub fn overwrite_image(&mut self, image: &'r Image, next: Use) {
         let before = image.replace_use(next);
-        let ((src_stage, src_access), (dst_stage, dst_access)) = (before.access(), next.access());
-        self.barrier(image, (src_stage, src_access, Use::Nothing), (dst_stage, dst_access, next));
+        self.barrier(image, before, Use::Nothing.layout(), next);
     }
 
-    fn change_use(&mut self, image: &Image, before: Use, next: Use) {
+    fn barrier(&mut self, image: &Image, before: Use, layout: vk::ImageLayout, next: Use) {
         let ((src_stage, src_access), (dst_stage, dst_access)) = (before.access(), next.access());
-        self.barrier(image, (src_stage, src_access, before), (dst_stage, dst_access, next));
-    }
-
-    fn barrier(
-        &mut self,
-        image: &Image,
-        (src_stage, src_access, before): (vk::PipelineStageFlags2, vk::AccessFlags2, Use),
-        (dst_stage, dst_access, next): (vk::PipelineStageFlags2, vk::AccessFlags2, Use),
-    ) {
         let barriers = [vk::ImageMemoryBarrier2::default()
             .src_stage_mask(src_stage)
             .src_access_mask(src_access)
             .dst_stage_mask(dst_stage)
             .dst_access_mask(dst_access)
-            .old_layout(before.layout())
+            .old_layout(layout)
             .new_layout(next.layout())
             .src_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .dst_queue_family_index(vk::QUEUE_FAMILY_IGNORED)
             .image(image.handle)
             .subresource_range(image.range())];
         let dependency = vk::DependencyInfo::default().image_memory_barriers(&barriers);
-        // SAFETY: the image is alive, and its layout is that of its last use, which `Image` keeps.
+        // SAFETY: the image is alive, and its layout is that of its last use, which `Image` keeps, or its content is not needed.
         unsafe { self.device().cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
     }
 

@@ -26,7 +26,8 @@ pub struct Open {
     pub(super) ledger: Mutex<Ledger>,
     names: Option<ext::debug_utils::Device>,
     info: DeviceInfo,
-    instance: Arc<Instance>,
+    /// Held so that it outlives the device.
+    _instance: Arc<Instance>,
 }
 
 impl Deref for Gpu {
@@ -89,18 +90,13 @@ impl Gpu {
             ledger: Mutex::default(),
             names,
             info,
-            instance: Arc::clone(instance),
+            _instance: Arc::clone(instance),
         })))
     }
 
     /// What is known of the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
-    }
-
-    /// The instance that it was found by.
-    pub fn instance(&self) -> &Arc<Instance> {
-        &self.instance
     }
 
     /// The most bytes of device memory that were held at one time.
