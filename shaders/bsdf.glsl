@@ -9,6 +9,8 @@
 
 #include "effects.glsl"
 #include "environment.glsl"
+#include "fresnel.glsl"
+#include "microfacet.glsl"
 
 struct SurfaceData {
     vec3 normal;
@@ -19,46 +21,6 @@ struct SurfaceData {
     float refractionGreen;
     float refractionIntensity;
 };
-
-// Cosine of the transmitted angle by Snell's law, report E(3), from 0; 0 where light is totally reflected.
-// The report's 1 - (etaI / etaT)^2 (1 - cos^2), factored so that nothing cancels at grazing angles or where the indices are
-// nearly equal.
-float GetCosThetaTr(float cosThetaIn, float etaI, float etaT)
-{
-    precise float bent = etaI * cosThetaIn;
-    precise float squared = (etaT - etaI) * (etaT + etaI) + bent * bent;
-    return sqrt(max(0.0, squared)) / etaT;
-}
-
-// The least magnitude of a ratio of amplitudes that is inverted: the rounding error of 1.
-const float LEAST_RATIO = 1.2e-7;
-
-// Unpolarised Fresnel reflectance, report E(4), from 0 to 1 in front. From behind, where the cosine is negative and the
-// indices are not swapped, the report's amplitudes are those of the front, inverted: at least 1, and infinite at Brewster's angle.
-// There, the one deviation from the report's values, they stay finite. Equal indices reflect nothing, from either side.
-float FresnelBSDF(float cosThetaIn, float etaIn, float etaTr)
-{
-    cosThetaIn = clamp(cosThetaIn, -1.0, 1.0);
-    if (etaIn == etaTr) return 0.0;
-    float cosThetaTr = GetCosThetaTr(cosThetaIn, etaIn, etaTr);
-    if (cosThetaTr <= 0.0) return 1.0; // total internal reflection
-
-    // (a - b) / (a + b) as (a^2 - b^2) / (a + b)^2, with Snell's law put into the numerators: no difference of nearly equal
-    // numbers is left but at Brewster's angle.
-    float cosine = abs(cosThetaIn);
-    float in2 = etaIn * etaIn;
-    float tr2 = etaTr * etaTr;
-    precise float contrast = (etaTr - etaIn) * (etaTr + etaIn);
-    float parallel = etaTr * (etaTr * cosine + etaIn * cosThetaTr);
-    float perpendicular = etaIn * cosine + etaTr * cosThetaTr;
-    float f0 = contrast * ((tr2 + in2) * cosine * cosine - in2) / (parallel * parallel);
-    float f90 = -contrast / (perpendicular * perpendicular);
-    if (cosThetaIn < 0.0) {
-        f0 = 1.0 / max(abs(f0), LEAST_RATIO);
-        f90 = 1.0 / max(abs(f90), LEAST_RATIO);
-    }
-    return (f0 * f0 + f90 * f90) / 2.0;
-}
 
 // The share of reflection in a mixture. From behind the reflectance is above 1; an image holds no less than no light.
 float ReflectedShare(SurfaceData data, vec3 viewDir)
@@ -100,20 +62,11 @@ vec3 ComputeScatteredLighting(vec3 reflection, vec3 transmission, SurfaceData da
     return transmission + ReflectedShare(data, viewDir) * (reflection - transmission);
 }
 
-// Distribution of microfacet normals, GGX: Walter et al. 2007, equation 33, in a form that does not overflow at small alpha.
-// 0 at alpha 0, where a point light has no highlight that could be seen.
-float DistributionGGX(vec3 normal, vec3 halfDir, float alpha)
+// The square of the sine of the angle between two directions: 1 - cos^2 has no digits left where the highlight is.
+float SinSquaredTo(vec3 a, vec3 b)
 {
-    float cosine = max(dot(normal, halfDir), 0.0);
-    vec3 sine = cross(normal, halfDir); // 1 - cos^2 has no digits left where the highlight is
-    float ratio = alpha / max(alpha * alpha * cosine * cosine + dot(sine, sine), 1e-30);
-    return ratio * ratio / PI;
-}
-
-// Smith's masking for GGX divided by twice the cosine: Walter et al. 2007, equation 34. Finite at grazing angles.
-float MaskingOverCosineGGX(float cosine, float alpha)
-{
-    return 1.0 / (cosine + sqrt(alpha * alpha + (1.0 - alpha * alpha) * cosine * cosine));
+    vec3 sine = cross(a, b);
+    return dot(sine, sine);
 }
 
 // Light of a point light mirrored by the surface, per unit of irradiance on a plane that faces the light. The red tint is that
@@ -124,10 +77,12 @@ vec3 ComputeSpecularReflectionDirect(SurfaceData data, vec3 viewDir, vec3 lightD
     float cosThetaLight = dot(data.normal, lightDir);
     if (!REFLECTION || cosThetaView <= 0.0 || cosThetaLight <= 0.0) return vec3(0.0);
     float alpha = data.roughness * data.roughness;
-    float distribution = DistributionGGX(data.normal, normalize(viewDir + lightDir), alpha);
+    vec3 halfDir = normalize(viewDir + lightDir);
+    float distribution = DistributionGGX(dot(data.normal, halfDir), SinSquaredTo(data.normal, halfDir), alpha);
     // D G / (4 cos cos), its cosines cancelled against those in G.
-    float specular = distribution * MaskingOverCosineGGX(cosThetaView, alpha) * MaskingOverCosineGGX(cosThetaLight, alpha);
-    return vec3(specular * cosThetaLight * data.reflectionIntensity);
+    float masking = MaskingOverCosineGGX(cosThetaView, SinSquaredTo(data.normal, viewDir), alpha)
+        * MaskingOverCosineGGX(cosThetaLight, SinSquaredTo(data.normal, lightDir), alpha);
+    return vec3(distribution * masking * cosThetaLight * data.reflectionIntensity);
 }
 
 // The reflection of a point light, interpolated with no light by the Fresnel reflectance.

@@ -4,12 +4,11 @@
 #define ENVIRONMENT_GLSL
 
 #extension GL_EXT_samplerless_texture_functions : require
+#include "constants.glsl"
 #include "shared.glsl"
 
 // Constants beyond those of effects.glsl start at 64.
 layout(constant_id = 64) const bool ENVIRONMENT_IMAGE = true;
-
-const float PI = 3.14159265358979;
 
 // atan(y / x) in the right quadrant, in radians. Vulkan lets the built-in be off by 4096 ULP, several texels of a large
 // image; this minimax polynomial is within 2e-7 everywhere. 0 at the origin.

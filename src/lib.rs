@@ -20,6 +20,7 @@ pub mod error;
 #[allow(unsafe_code)]
 pub mod gpu;
 pub mod image;
+pub mod numerics;
 pub mod optics;
 pub mod options;
 pub mod passes;

@@ -1,6 +1,7 @@
 //! What the program offers, one file a command.
 
 mod devices;
+mod numerics;
 mod render;
 
 use std::error::Error as _;
@@ -30,6 +31,8 @@ struct Cli {
 enum Command {
     /// Renders one image, off screen
     Render(Box<render::RenderCommand>),
+    /// Holds the shaders' optics functions on a device against 64-bit arithmetic
+    Numerics(numerics::NumericsCommand),
     /// Lists the Vulkan devices and what each can do
     Devices(devices::DevicesCommand),
 }
@@ -83,6 +86,7 @@ pub fn main() -> ExitCode {
     };
     let result = match cli.command {
         Command::Render(command) => command.run(cli.talk),
+        Command::Numerics(command) => command.run(cli.talk),
         Command::Devices(command) => command.run(),
     };
     match result {

@@ -125,6 +125,17 @@ impl Commands {
         Ok(buffer)
     }
 
+    /// What `buffer` holds.
+    pub fn read_buffer(&mut self, buffer: &Buffer) -> Result<Vec<u8>> {
+        let desc = BufferDesc { name: "readback", size: buffer.size(), usage: BufferUse::Readback };
+        let readback = Buffer::new(&self.gpu, &desc)?;
+        self.run(|cmd| {
+            cmd.wait_for_buffers();
+            cmd.copy_buffer(buffer, &readback);
+        })?;
+        Ok(readback.bytes().to_vec())
+    }
+
     /// An image of `desc` that holds `texels`, row after row.
     pub fn upload_image(&mut self, desc: &ImageDesc<'_>, texels: &[u8]) -> Result<Image> {
         let image = Image::new(&self.gpu, desc)?;

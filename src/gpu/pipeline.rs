@@ -34,10 +34,16 @@ impl Specialization {
 
     /// One more constant.
     #[must_use]
-    pub fn with(mut self, id: u32, value: bool) -> Self {
+    pub fn with(self, id: u32, value: bool) -> Self {
+        self.with_number(id, value.into())
+    }
+
+    /// One more constant, a `uint`.
+    #[must_use]
+    pub fn with_number(mut self, id: u32, value: u32) -> Self {
         let offset = self.values.len() as u32;
-        self.entries.push(vk::SpecializationMapEntry { constant_id: id, offset, size: size_of::<vk::Bool32>() });
-        self.values.extend_from_slice(&vk::Bool32::from(value).to_ne_bytes());
+        self.entries.push(vk::SpecializationMapEntry { constant_id: id, offset, size: size_of::<u32>() });
+        self.values.extend_from_slice(&value.to_ne_bytes());
         self
     }
 

@@ -2,4 +2,10 @@
 //!
 //! In flow directions of unit length, cosines and indices; out flow directions and shares of light, from 0 to 1 unless said.
 
+pub mod fresnel;
+pub mod medium;
+pub mod microfacet;
+pub mod offset;
 pub mod original;
+mod pair;
+pub mod rough;

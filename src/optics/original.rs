@@ -4,9 +4,9 @@
 //! Indices are not swapped where a surface is seen from behind: the cosine is negative there. Written as the report writes it, not
 //! as the shader arranges it: 64 bits bear the cancellations.
 
-use std::f64::consts::PI;
-
 use glam::DVec3;
+
+use super::microfacet::{distribution_ggx, masking_ggx};
 
 /// Cosine of the transmitted angle by Snell's law, E(3); 0 where light is totally reflected.
 pub fn get_cos_theta_tr(cos_theta_in: f64, eta_i: f64, eta_t: f64) -> f64 {
@@ -46,19 +46,6 @@ pub fn transmission_dir(view_dir: DVec3, normal: DVec3, refraction_index: f64, f
     Some(ratio * -view_dir + (ratio * cos_theta_in - cos_theta_tr) * normal)
 }
 
-/// Distribution of microfacet normals, GGX, at the angle whose cosine is `cos_theta`: Walter et al. 2007, equation 33.
-pub fn distribution_ggx(cos_theta: f64, alpha: f64) -> f64 {
-    let sin_squared = 1.0 - cos_theta * cos_theta;
-    let ratio = alpha / (alpha * alpha * cos_theta * cos_theta + sin_squared);
-    ratio * ratio / PI
-}
-
-/// Smith's masking for GGX, one direction: Walter et al. 2007, equation 34.
-pub fn masking_ggx(cos_theta: f64, alpha: f64) -> f64 {
-    let tan_squared = 1.0 / (cos_theta * cos_theta) - 1.0;
-    2.0 / (1.0 + (1.0 + alpha * alpha * tan_squared).sqrt())
-}
-
 /// Light of a point light mirrored by the surface, per unit of irradiance on a plane that faces the light: the GGX BRDF
 /// without its Fresnel factor, times the cosine at the light.
 pub fn specular_reflection_direct(view_dir: DVec3, light_dir: DVec3, normal: DVec3, roughness: f64) -> f64 {
@@ -68,8 +55,11 @@ pub fn specular_reflection_direct(view_dir: DVec3, light_dir: DVec3, normal: DVe
     }
     let alpha = roughness * roughness;
     let half_dir = (view_dir + light_dir).normalize();
-    let masking = masking_ggx(cos_view, alpha) * masking_ggx(cos_light, alpha);
-    distribution_ggx(normal.dot(half_dir), alpha) * masking / (4.0 * cos_view * cos_light) * cos_light
+    let sin_squared = |w: DVec3| normal.cross(w).length_squared();
+    let masking =
+        masking_ggx(cos_view, sin_squared(view_dir), alpha) * masking_ggx(cos_light, sin_squared(light_dir), alpha);
+    let distribution = distribution_ggx(normal.dot(half_dir), sin_squared(half_dir), alpha);
+    distribution * masking / (4.0 * cos_view * cos_light) * cos_light
 }
 
 #[cfg(test)]

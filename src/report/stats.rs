@@ -48,6 +48,18 @@ pub struct DeviceStats {
     pub kind: String,
 }
 
+impl DeviceStats {
+    /// Those of `device`.
+    pub fn new(device: &DeviceInfo) -> Self {
+        Self {
+            name: device.name.clone(),
+            driver: device.driver.clone(),
+            api: device.api.clone(),
+            kind: device.kind.to_string(),
+        }
+    }
+}
+
 /// A pass, over all samples.
 #[derive(Clone, Debug, Serialize)]
 #[allow(missing_docs, reason = "docs/stats.md describes the members")]
@@ -87,12 +99,7 @@ impl Stats {
         Self {
             schema: 1,
             vitrum: env!("CARGO_PKG_VERSION"),
-            device: DeviceStats {
-                name: device.name.clone(),
-                driver: device.driver.clone(),
-                api: device.api.clone(),
-                kind: device.kind.to_string(),
-            },
+            device: DeviceStats::new(device),
             scene: scene.name.clone(),
             model: plan.model.name(),
             size: [plan.size.width, plan.size.height],

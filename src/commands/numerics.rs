@@ -1,0 +1,125 @@
+//! `vitrum numerics`: the shaders' optics functions on a device against 64-bit arithmetic.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::{Talk, devices, print};
+use crate::gpu::{Gpu, Instance};
+use crate::image::OutputFile;
+use crate::numerics::{FUNCTIONS, Function, suite};
+use crate::report::{NumericsReport, evaluate_table};
+use crate::{Error, Result};
+
+/// Options of `vitrum numerics`.
+#[derive(Debug, Args)]
+#[command(after_long_help = functions_help())]
+pub(super) struct NumericsCommand {
+    /// One function instead of all; with --inputs, evaluated there
+    #[arg(long, value_name = "NAME")]
+    function: Option<String>,
+
+    /// A CSV file with a column for each input of the function; further columns are passed through
+    #[arg(long, value_name = "IN.csv", requires = "function")]
+    inputs: Option<PathBuf>,
+
+    /// With --inputs the CSV file of the results, else a folder for numerics.json and plots of error against angle;
+    /// [default: standard output]
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+
+    /// Inputs tried in each region of a function
+    #[arg(long, value_name = "N", default_value_t = 2_750_000, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
+    count: u64,
+
+    /// Seed of the inputs
+    #[arg(long, value_name = "N", default_value_t = 0)]
+    seed: u64,
+
+    /// Vulkan device: part of its name, its index, or "list" [default: the best one]
+    #[arg(long, value_name = "NAME|INDEX|list", env = "VITRUM_DEVICE")]
+    device: Option<String>,
+
+    /// Run under the validation layer; any message makes the run fail with 1
+    #[arg(long)]
+    validation: bool,
+}
+
+impl NumericsCommand {
+    pub(super) fn run(self, talk: Talk) -> Result<()> {
+        if self.device.as_deref() == Some("list") {
+            return print(&devices::table(&Instance::new(/* validation: */ false)?.devices()?));
+        }
+        let function = match &self.function {
+            Some(name) => Some(Function::named(name).map_err(|error| Error::Usage(format!("--function: {error}")))?),
+            None => None,
+        };
+        let open = || -> Result<_> {
+            let instance = Instance::new(self.validation)?;
+            let gpu = Gpu::open(&instance, instance.choose(self.device.as_deref())?)?;
+            Ok((instance, gpu))
+        };
+        let (messages, verdict) = match (function, &self.inputs) {
+            (Some(function), Some(inputs)) => {
+                let output = self.output.as_deref().map(OutputFile::new).transpose()?;
+                if let Some(output) = output.as_ref().filter(|output| output.replaces(inputs)) {
+                    let message = "is read by this run and would be replaced; name another file";
+                    return Err(Error::input(output.path(), 0, message));
+                }
+                let table = evaluate_table::Table::read(function, inputs)?;
+                let (instance, gpu) = open()?;
+                let text = table.evaluate(&gpu)?;
+                match &output {
+                    Some(output) => output.write(text.as_bytes())?,
+                    None => print(&text)?,
+                }
+                (instance.messages(), Ok(()))
+            }
+            _ => {
+                let folder = self.output.as_deref().map(crate::report::folder).transpose()?;
+                let (instance, gpu) = open()?;
+                talk.detail(&format!("device: {} ({})", gpu.info().name, gpu.info().driver));
+                let bar = self.progress_bar(talk);
+                let regions = suite::run(&gpu, self.function.as_deref(), self.count, self.seed, &mut |done| {
+                    bar.set_position(done)
+                })?;
+                bar.finish_and_clear();
+                let report = NumericsReport::new(gpu.info(), self.seed, regions);
+                print(&report.table())?;
+                if let Some(folder) = folder {
+                    report.write(&folder)?;
+                }
+                (instance.messages(), report.verdict())
+            }
+        };
+        match messages.all().as_slice() {
+            [] => verdict.map_err(Error::Check),
+            [first, ..] => Err(Error::Check(format!(
+                "the validation layer has {} messages, the first: {}",
+                messages.count(),
+                first.lines().next().unwrap_or_default()
+            ))),
+        }
+    }
+
+    fn progress_bar(&self, talk: Talk) -> ProgressBar {
+        if !talk.shows_progress() {
+            return ProgressBar::hidden();
+        }
+        let bar = ProgressBar::new(suite::regions(self.function.as_deref()) as u64);
+        match ProgressStyle::with_template("{bar:40} {pos}/{len} regions {eta}") {
+            Ok(style) => bar.with_style(style),
+            Err(_) => bar,
+        }
+    }
+}
+
+fn functions_help() -> String {
+    let mut text = "Functions, with their columns:\n".to_owned();
+    for Function { name, about, inputs, outputs, .. } in &FUNCTIONS {
+        text += &format!("  {name}: {about}\n      {} -> {}\n", inputs.join(","), outputs.join(","));
+    }
+    text + "Directions are in the local frame, whose +z is the normal, and point away from the surface; eta is the index on \
+            the side of -z over that on the side of +z. docs/numerics.md has the bounds."
+}

@@ -1,0 +1,16 @@
+//! Whether a device computes the optics functions of `shaders/` as 64-bit arithmetic does.
+//!
+//! In flow a device and a table of functions, regions and bounds; out flow the worst errors, with the inputs that caused them.
+//! [`FUNCTIONS`] says what there is to call, [`suite`] which inputs are tried and what may come out, [`Probe`] runs
+//! `shaders/probe.comp`, which includes the files that renders use.
+
+mod functions;
+mod measures;
+mod probe;
+mod regions;
+pub mod suite;
+
+pub use functions::{FUNCTIONS, Function};
+pub use measures::{Measure, ulps};
+pub use probe::Probe;
+pub use regions::Region;

@@ -1,0 +1,289 @@
+//! Every region of every function: what is the worst, where, and is it within bounds?
+
+use std::num::NonZero;
+use std::thread;
+
+use fastrand::Rng;
+
+use super::measures::Case;
+use super::regions::REGIONS;
+use super::{Function, Measure, Probe, Region};
+use crate::gpu::{Gpu, Result};
+
+/// Errors are kept by the angle of incidence, one bin a degree.
+pub const ANGLES: usize = 90;
+
+/// Evaluations that one thread generates or compares at a time; each batch has its own seed, so that results do not depend
+/// on how many threads there are.
+const BATCH: usize = 1 << 13;
+
+/// Evaluations between two dispatches.
+const ROUND: usize = 1 << 17;
+
+/// What one measure came to in one region.
+#[derive(Clone, Debug)]
+pub struct Finding {
+    /// The function.
+    pub function: &'static str,
+    /// The region.
+    pub region: &'static str,
+    /// The measure.
+    pub measure: String,
+    /// What may come out; infinite: for comparison only.
+    pub bound: f64,
+    /// The bound is on the share of evaluations, the mean, not on the worst.
+    pub is_share: bool,
+    /// Evaluations.
+    pub count: u64,
+    /// The worst error; infinite where an output was not a number.
+    pub worst: f64,
+    /// The inputs that caused it, by the function's columns.
+    pub cause: Vec<f32>,
+    /// The mean error.
+    pub mean: f64,
+    /// The worst error by angle of incidence in degrees, where the function has one.
+    pub by_angle: Option<Vec<f64>>,
+}
+
+impl Finding {
+    /// What the bound is held against.
+    pub fn found(&self) -> f64 {
+        if self.is_share { self.mean } else { self.worst }
+    }
+
+    /// Whether the bound holds.
+    pub fn holds(&self) -> bool {
+        self.found() <= self.bound
+    }
+}
+
+/// What a region came to.
+#[derive(Clone, Debug)]
+pub struct RegionReport {
+    /// The function.
+    pub function: &'static str,
+    /// The region.
+    pub region: &'static str,
+    /// Evaluations.
+    pub count: u64,
+    /// Outputs that were not finite.
+    pub non_finite: u64,
+    /// The inputs of one of them.
+    pub non_finite_cause: Option<Vec<f32>>,
+    /// One a measure.
+    pub findings: Vec<Finding>,
+}
+
+/// How many regions `only`, or every function, has.
+pub fn regions(only: Option<&str>) -> usize {
+    selected(only).count()
+}
+
+fn selected(only: Option<&str>) -> impl Iterator<Item = &'static Region> {
+    REGIONS.iter().filter(move |region| only.is_none_or(|name| region.function == name))
+}
+
+/// Tries `count` inputs in each region of the function called `only`, or of all. `progress` hears how many regions are done.
+pub fn run(
+    gpu: &Gpu,
+    only: Option<&str>,
+    count: u64,
+    seed: u64,
+    progress: &mut dyn FnMut(u64),
+) -> Result<Vec<RegionReport>> {
+    let mut reports = Vec::new();
+    for (done, region) in (1..).zip(selected(only)) {
+        if let Ok(function) = Function::named(region.function) {
+            reports.push(try_region(gpu, function, region, count, seed)?);
+        }
+        progress(done);
+    }
+    Ok(reports)
+}
+
+fn try_region(gpu: &Gpu, function: &'static Function, region: &Region, count: u64, seed: u64) -> Result<RegionReport> {
+    let mut probe = Probe::new(gpu, function)?;
+    let mut all = Tally::new(region);
+    let mut done = 0;
+    while done < count {
+        let now = (count - done).min(ROUND as u64) as usize;
+        let inputs = generate(function, region, now, seed ^ done.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let outputs = probe.evaluate(&inputs)?;
+        all.merge(compare(function, region, &inputs, &outputs));
+        done += now as u64;
+    }
+    Ok(all.report(function, region))
+}
+
+fn threads() -> usize {
+    thread::available_parallelism().map_or(1, NonZero::get)
+}
+
+/// Runs `work` on every batch, on all processors, and returns what comes out in the order of the batches.
+fn in_batches<'a, T: Send>(
+    batches: impl Iterator<Item = (&'a mut [f32], usize)>,
+    work: impl Fn(&mut [f32], usize) -> T + Sync,
+) -> Vec<T> {
+    let mut shares: Vec<Vec<(&mut [f32], usize)>> = (0..threads()).map(|_| Vec::new()).collect();
+    let many = shares.len();
+    for (i, batch) in batches.enumerate() {
+        shares[i % many].push(batch);
+    }
+    let work = &work;
+    let mut results: Vec<(usize, T)> = thread::scope(|scope| {
+        let handles: Vec<_> = shares
+            .into_iter()
+            .map(|share| {
+                scope.spawn(move || share.into_iter().map(|(batch, i)| (i, work(batch, i))).collect::<Vec<_>>())
+            })
+            .collect();
+        handles
+            .into_iter()
+            .flat_map(|handle| handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
+            .collect()
+    });
+    results.sort_by_key(|&(i, _)| i);
+    results.into_iter().map(|(_, result)| result).collect()
+}
+
+fn generate(function: &Function, region: &Region, count: usize, seed: u64) -> Vec<f32> {
+    let columns = function.inputs.len();
+    let mut inputs = vec![0.0; count * columns];
+    in_batches(inputs.chunks_mut(BATCH * columns).zip(0..), |batch, i| {
+        let mut rng = Rng::with_seed(seed.wrapping_add(i as u64));
+        for row in batch.chunks_mut(columns) {
+            (region.generate)(&mut rng, row);
+        }
+    });
+    inputs
+}
+
+fn compare(function: &Function, region: &Region, inputs: &[f32], outputs: &[f32]) -> Tally {
+    let (columns, results) = (function.inputs.len(), function.outputs.len());
+    // The batches are read only; a thread takes its share by number.
+    let batches = inputs.len() / columns;
+    let parts = thread::scope(|scope| {
+        let step = batches.div_ceil(threads()).max(1);
+        let handles: Vec<_> = inputs
+            .chunks(step * columns)
+            .zip(outputs.chunks(step * results))
+            .map(|(inputs, outputs)| scope.spawn(move || tally(function, region, inputs, outputs)))
+            .collect();
+        let join = |handle: thread::ScopedJoinHandle<'_, Tally>| {
+            handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+        };
+        handles.into_iter().map(join).collect::<Vec<_>>()
+    });
+    let mut all = Tally::new(region);
+    parts.into_iter().for_each(|part| all.merge(part));
+    all
+}
+
+fn tally(function: &Function, region: &Region, inputs: &[f32], outputs: &[f32]) -> Tally {
+    let (columns, results) = (function.inputs.len(), function.outputs.len());
+    let cosine = ["cos_i", "wi_z"].iter().find_map(|name| function.inputs.iter().position(|column| column == name));
+    let mut tally = Tally::new(region);
+    for (inputs, outputs) in inputs.chunks(columns).zip(outputs.chunks(results)) {
+        tally.count += 1;
+        let broken = outputs.iter().filter(|x| !x.is_finite()).count() as u64;
+        if broken > 0 {
+            tally.non_finite += broken;
+            tally.non_finite_cause.get_or_insert_with(|| inputs.to_vec());
+        }
+        if region.bounds.is_empty() {
+            continue;
+        }
+        let wide: Vec<f64> = inputs.iter().map(|&x| x.into()).collect();
+        let expected = (function.reference)(&wide);
+        let case = Case { inputs, outputs, expected: &expected };
+        let bin = cosine.map(|column| {
+            let degrees = wide[column].abs().min(1.0).acos().to_degrees();
+            (degrees as usize).min(ANGLES - 1)
+        });
+        for ((measure, _), sum) in region.bounds.iter().zip(&mut tally.sums) {
+            sum.add(measure.error(&case), inputs, bin);
+        }
+    }
+    tally
+}
+
+/// Errors on their way to a report.
+struct Tally {
+    count: u64,
+    non_finite: u64,
+    non_finite_cause: Option<Vec<f32>>,
+    sums: Vec<Sum>,
+}
+
+#[derive(Clone)]
+struct Sum {
+    worst: f64,
+    cause: Vec<f32>,
+    total: f64,
+    by_angle: Option<Vec<f64>>,
+}
+
+impl Sum {
+    fn add(&mut self, error: f64, inputs: &[f32], bin: Option<usize>) {
+        let error = if error.is_nan() { f64::INFINITY } else { error };
+        self.total += error;
+        if error > self.worst || self.cause.is_empty() {
+            self.worst = error;
+            self.cause.clear();
+            self.cause.extend_from_slice(inputs);
+        }
+        if let Some(bin) = bin {
+            let worst = &mut self.by_angle.get_or_insert_with(|| vec![0.0; ANGLES])[bin];
+            *worst = worst.max(error);
+        }
+    }
+
+    fn merge(&mut self, other: Self) {
+        self.total += other.total;
+        if other.worst > self.worst || self.cause.is_empty() {
+            (self.worst, self.cause) = (other.worst, other.cause);
+        }
+        match (&mut self.by_angle, other.by_angle) {
+            (Some(mine), Some(theirs)) => mine.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.max(b)),
+            (mine @ None, theirs) => *mine = theirs,
+            _ => {}
+        }
+    }
+}
+
+impl Tally {
+    fn new(region: &Region) -> Self {
+        let sum = Sum { worst: 0.0, cause: Vec::new(), total: 0.0, by_angle: None };
+        Self { count: 0, non_finite: 0, non_finite_cause: None, sums: vec![sum; region.bounds.len()] }
+    }
+
+    fn merge(&mut self, other: Self) {
+        self.count += other.count;
+        self.non_finite += other.non_finite;
+        self.non_finite_cause = self.non_finite_cause.take().or(other.non_finite_cause);
+        self.sums.iter_mut().zip(other.sums).for_each(|(mine, theirs)| mine.merge(theirs));
+    }
+
+    fn report(self, function: &Function, region: &Region) -> RegionReport {
+        let finding = |((measure, bound), sum): (&(Measure, f64), Sum)| Finding {
+            function: region.function,
+            region: region.name,
+            measure: measure.name(function),
+            bound: *bound,
+            is_share: measure.is_share(),
+            count: self.count,
+            worst: sum.worst,
+            cause: sum.cause,
+            mean: sum.total / self.count.max(1) as f64,
+            by_angle: sum.by_angle,
+        };
+        RegionReport {
+            function: region.function,
+            region: region.name,
+            count: self.count,
+            non_finite: self.non_finite,
+            non_finite_cause: self.non_finite_cause,
+            findings: region.bounds.iter().zip(self.sums).map(finding).collect(),
+        }
+    }
+}
