@@ -41,7 +41,7 @@ const FRESNEL_AND_TEXTBOOK: &[(Measure, f64)] = &[
 ];
 const REFRACT: &[(Measure, f64)] =
     &[(Absolute(0), 3e-7), (Absolute(1), 3e-7), (Absolute(2), 3e-7), (Length(0), 5e-7), (Wrong(3), 0.0)];
-const TRANSMITTED_SHARE: &[(Measure, f64)] = &[(Ulp(0), 8.0), (Absolute(0), 4e-7)];
+const TRANSMITTED_SHARE: &[(Measure, f64)] = &[(Ulp(0), 10.0), (Absolute(0), 5e-7)];
 const ROUGH_VALUE: f64 = 1e-6;
 const VISIBLE_NORMAL: &[(Measure, f64)] = &[(FACET, 3e-6), (Length(0), 5e-7)];
 
@@ -101,7 +101,7 @@ const REFRACT_CRITICAL: &[(Measure, f64)] = &[
 const EVAL: &[(Measure, f64)] = &[(Relative(0, ROUGH_VALUE), 2e-3), (Relative(1, ROUGH_VALUE), 2e-3)];
 const SAMPLE: &[(Measure, f64)] = &[
     (SAMPLED_DIRECTION, 1e-3),
-    (SAMPLED_WEIGHT, 2e-3),
+    (SAMPLED_WEIGHT, 1e-4),
     (SAMPLED_PDF, 2e-3),
     (SAMPLED_VALUE, 2e-3),
     (SAMPLED_OTHERWISE, 1e-5),
@@ -183,12 +183,13 @@ const SAMPLED_DIRECTION: Measure = Other {
     },
 };
 const SAMPLED_WEIGHT: Measure = Other {
-    name: "weight, relative to radiance's scale",
+    name: "weight over radiance's scale, times 1 - u2",
     share: false,
     error: |case| {
         let (interface, _, wo) = sampled(case);
         let scale = if wo.z > 0.0 { 1.0 } else { (interface.eta_i / interface.eta_t).powi(2) };
-        if is_comparable(case) { (f64::from(case.outputs[3]) - case.expected[3]).abs() / scale } else { 0.0 }
+        let near_one = 1.0 - f64::from(case.inputs[6]);
+        if is_comparable(case) { (f64::from(case.outputs[3]) - case.expected[3]).abs() / scale * near_one } else { 0.0 }
     },
 };
 /// The decision between the branches, or whether light comes, fell otherwise than in 64 bits: u3 was as close to the reflectance
