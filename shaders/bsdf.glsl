@@ -1,4 +1,4 @@
-// The original's BSDF of smooth dielectrics: one interface, seen from the rasteriser.
+// The original's BSDF of smooth dielectrics, and that of rough ones: one interface, seen from the rasteriser.
 // A. Ferreira Gomes, "Glass Refraction Using BSDF for Smooth Dielectrics" (2025), section 3. The formulas are those of
 // Pharr, Jakob & Humphreys, Physically Based Rendering (3rd ed.), 8.2.
 //
@@ -7,15 +7,17 @@
 #ifndef BSDF_GLSL
 #define BSDF_GLSL
 
+#include "compensation.glsl"
 #include "effects.glsl"
 #include "environment.glsl"
-#include "fresnel.glsl"
-#include "microfacet.glsl"
+#include "rough.glsl"
 
 struct SurfaceData {
     vec3 normal;
+    bool behind;            // the surface itself, not only its interpolated normal, is turned away
     float refractionIndex;
     float roughness;
+    uint albedoTable;
     float reflectionRed;
     float reflectionIntensity;
     float refractionGreen;
@@ -89,6 +91,94 @@ vec3 ComputeSpecularReflectionDirect(SurfaceData data, vec3 viewDir, vec3 lightD
 vec3 ComputeDirect(vec3 reflection, SurfaceData data, vec3 viewDir)
 {
     return ReflectedShare(data, viewDir) * reflection;
+}
+
+// ---- rough surfaces: Walter et al. 2007 in the place of the smooth interface ---------------------------------------------------
+
+// Up to the original's default a surface is smooth: its highlights are narrower than a pixel, and nothing else differs.
+const float SMOOTH_ROUGHNESS = 0.01;
+
+bool IsRough(SurfaceData data)
+{
+    return ROUGHNESS && data.roughness > SMOOTH_ROUGHNESS && data.refractionIndex != 1.0;
+}
+
+// A rough surface and the direction that it is seen from, in its local frame.
+struct RoughSurface {
+    mat3 toWorld;
+    vec3 wi;
+    float alpha;
+    float scale;  // what a single bounce loses, given back
+};
+
+RoughSurface RoughSurfaceSeenFrom(SurfaceData data, vec3 viewDir)
+{
+    RoughSurface surface;
+    surface.toWorld = BasisAround(data.behind ? -data.normal : data.normal);
+    surface.wi = viewDir * surface.toWorld;
+    // At rims interpolated normals turn away before the surface does.
+    surface.wi.z = max(surface.wi.z, 1e-4);
+    surface.wi = normalize(surface.wi);
+    surface.alpha = data.roughness * data.roughness;
+    surface.scale = ENERGY_COMPENSATION ? RoughCompensation(data.albedoTable, surface.wi.z) : 1.0;
+    return surface;
+}
+
+// Light that facets mirror and refract, as means over visible normals. `shift` is the pixel's own, `first` the number of normals
+// taken before, `inAll` of those that share the picture: each stands for a cone of directions, and the environment is
+// averaged over it.
+//
+// Each facet mixes reflection and transmission by its own Fresnel reflectance. As with smooth surfaces transmitted radiance is
+// not scaled by the ratio of the indices, and facets seen from behind mirror everything.
+vec3 ComputeRoughLight(SurfaceData data, vec3 viewDir, uvec2 shift, uint first, uint count, float inAll)
+{
+    RoughSurface surface = RoughSurfaceSeenFrom(data, viewDir);
+    vec3 wi = surface.wi;
+    float eta = data.refractionIndex;
+    vec3 light = vec3(0.0);
+    float weights = 0.0;
+    for (uint k = 0; k < count; ++k) {
+        vec3 wm = SampleVisibleNormal(wi, surface.alpha, PlasticPoint(first + k, shift));
+        float cosI = dot(wi, wm);
+        Interface facet = FresnelDielectric(cosI, 1.0, eta);
+        float reflected = data.behind ? 1.0 : facet.reflectance;
+
+        vec3 wr = 2.0 * cosI * wm - wi;
+        float weight = reflected * MaskingGGX(wr.z, SinSquared(wr), surface.alpha);
+        if (wr.z > 0.0) {
+            weights += weight;
+            if (REFLECTION) {
+                float pdf = FacetDensity(wi, wm, surface.alpha, /* reflected */ true, 1.0, cosI, 0.0, eta, 1.0);
+                vec3 radiance = SampleEnvironment(surface.toWorld * wr, EnvironmentLod(1.0 / (inAll * pdf)));
+                light += weight * data.reflectionIntensity * (radiance + vec3(data.reflectionRed, 0.0, 0.0));
+            }
+        }
+        if (data.behind || facet.total) continue;
+        vec3 wt = RefractThroughFacet(wi, wm, cosI, facet.cosThetaT, 1.0, eta);
+        if (TRANSMISSION && wt.z < 0.0) {
+            float denominator = (eta - 1.0) * (eta + 1.0) / (cosI + eta * facet.cosThetaT);
+            float pdf = FacetDensity(wi, wm, surface.alpha, /* reflected */ false, 1.0, cosI, facet.cosThetaT, eta, denominator);
+            vec3 radiance = SampleEnvironment(surface.toWorld * wt, EnvironmentLod(1.0 / (inAll * pdf)));
+            weight = facet.transmittance * MaskingGGX(-wt.z, SinSquared(wt), surface.alpha);
+            light += weight * data.refractionIntensity * (radiance + vec3(0.0, data.refractionGreen, 0.0));
+        }
+    }
+    // A mirror's loss is in no table; it is what its own weights say.
+    float scale = data.behind ? (ENERGY_COMPENSATION ? float(count) / max(weights, 1e-6) : 1.0) : surface.scale;
+    return light * scale / float(count);
+}
+
+// Light of a point light, mirrored by facets or refracted through them, per unit of irradiance on a plane that faces it.
+vec3 ComputeRoughDirect(SurfaceData data, vec3 viewDir, vec3 lightDir)
+{
+    RoughSurface surface = RoughSurfaceSeenFrom(data, viewDir);
+    vec3 wo = lightDir * surface.toWorld;
+    bool reflected = wo.z > 0.0;
+    if (reflected ? !REFLECTION : !TRANSMISSION || data.behind) return vec3(0.0);
+    float eta = data.refractionIndex;
+    float value = EvaluateRough(surface.wi, wo, surface.alpha, 1.0, eta).value;
+    if (reflected) return vec3(value * surface.scale * data.reflectionIntensity);
+    return vec3(value * eta * eta * surface.scale * data.refractionIntensity);
 }
 
 #endif

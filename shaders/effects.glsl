@@ -5,5 +5,7 @@
 layout(constant_id = 0) const bool REFLECTION = true;
 layout(constant_id = 1) const bool TRANSMISSION = true;
 layout(constant_id = 3) const bool DIRECT_LIGHT = true;
+layout(constant_id = 5) const bool ROUGHNESS = true;
+layout(constant_id = 6) const bool ENERGY_COMPENSATION = true;
 
 #endif

@@ -31,10 +31,24 @@ float Atan2(float y, float x)
     return y < 0.0 ? -angle : angle;
 }
 
-// Bilinear by hand: the filter of a GPU weighs texels in steps of 1/256 only.
-vec3 SampleEnvironmentImage(vec2 uv, int level)
+// Where a level of the image lies: the first at the top, its halves below it from left to right. Not mip levels: drivers may
+// fetch for all pixels of a quad from the level that one of them asks for.
+struct Level {
+    ivec2 corner;
+    ivec2 size;
+};
+
+Level EnvironmentLevel(int level)
 {
-    ivec2 size = textureSize(environment, level);
+    ivec2 whole = ivec2(frame.environmentSize);
+    if (level == 0) return Level(ivec2(0), whole);
+    return Level(ivec2(whole.x - (whole.x >> (level - 1)), whole.y), whole >> level);
+}
+
+// Bilinear by hand: the filter of a GPU weighs texels in steps of 1/256 only.
+vec3 SampleEnvironmentImage(vec2 uv, Level level)
+{
+    ivec2 size = level.size;
     vec2 position = uv * vec2(size) - 0.5;
     vec2 corner = floor(position);
     vec2 weight = position - corner;
@@ -43,20 +57,33 @@ vec3 SampleEnvironmentImage(vec2 uv, int level)
     low.x = low.x < 0 ? low.x + size.x : low.x;
     high.x = high.x >= size.x ? high.x - size.x : high.x;
     // Rows end at the poles; columns would leave the image only for a direction that is not a number.
-    low = clamp(low, ivec2(0), size - 1);
-    high = clamp(high, ivec2(0), size - 1);
-    vec3 top = mix(texelFetch(environment, low, level).rgb, texelFetch(environment, ivec2(high.x, low.y), level).rgb, weight.x);
-    vec3 bottom = mix(texelFetch(environment, ivec2(low.x, high.y), level).rgb, texelFetch(environment, high, level).rgb, weight.x);
+    low = level.corner + clamp(low, ivec2(0), size - 1);
+    high = level.corner + clamp(high, ivec2(0), size - 1);
+    vec3 top = mix(texelFetch(environment, low, 0).rgb, texelFetch(environment, ivec2(high.x, low.y), 0).rgb, weight.x);
+    vec3 bottom = mix(texelFetch(environment, ivec2(low.x, high.y), 0).rgb, texelFetch(environment, high, 0).rgb, weight.x);
     return mix(top, bottom, weight.y);
 }
 
-// Radiance arriving from `direction`, of any length above 0. `lod` is the level of the image's mip chain.
+// Radiance arriving from `direction`, of any length above 0. `lod` is the level of the image, from 0; between levels it is
+// interpolated.
 vec3 SampleEnvironment(vec3 direction, float lod)
 {
     if (!ENVIRONMENT_IMAGE) return frame.environmentRadiance;
     float u = Atan2(direction.x, -direction.z) / (2.0 * PI) + frame.environmentTurn;
     float v = Atan2(length(direction.xz), direction.y) / PI;
-    return frame.environmentRadiance * SampleEnvironmentImage(vec2(u - floor(u), v), int(lod));
+    vec2 uv = vec2(u - floor(u), v);
+    int level = int(lod);
+    vec3 radiance = SampleEnvironmentImage(uv, EnvironmentLevel(level));
+    if (lod > float(level)) radiance = mix(radiance, SampleEnvironmentImage(uv, EnvironmentLevel(level + 1)), lod - float(level));
+    return frame.environmentRadiance * radiance;
+}
+
+// The level whose texels are about as wide as a cone of `solidAngle`. Rows have the same height everywhere; towards the poles
+// columns get narrower, and there less is averaged than might be.
+float EnvironmentLod(float solidAngle)
+{
+    float rows = sqrt(solidAngle) * float(frame.environmentSize.y) / PI;
+    return clamp(log2(max(rows, 1e-3)), 0.0, float(frame.environmentLevels - 1));
 }
 
 #endif

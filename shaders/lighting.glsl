@@ -12,20 +12,31 @@ vec3 ComputeBSDFLight(SurfaceData data, vec3 viewDir)
     return ComputeScatteredLighting(reflection, transmission, data, viewDir);
 }
 
+// The same of a rough surface, for the pixel that is being drawn.
+vec3 ComputeRoughBSDFLight(SurfaceData data, vec3 viewDir, uvec2 pixel)
+{
+    uint first = sampleIndex * frame.normals;
+    uint inAll = frame.normalsInAll != 0 ? frame.normalsInAll : first + frame.normals;
+    uvec2 shift = Pcg3d(uvec3(pixel, frame.seed)).xy;
+    return ComputeRoughLight(data, viewDir, shift, first, frame.normals, float(inAll));
+}
+
 // Light of one point light.
 vec3 ComputeBSDFDirect(SurfaceData data, vec3 viewDir, vec3 position, Light light)
 {
     vec3 toLight = light.position - position;
     float distanceSquared = dot(toLight, toLight);
     if (distanceSquared == 0.0) return vec3(0.0);
-    vec3 reflection = ComputeSpecularReflectionDirect(data, viewDir, toLight * inversesqrt(distanceSquared));
-    return ComputeDirect(reflection, data, viewDir) * light.intensity / distanceSquared;
+    vec3 lightDir = toLight * inversesqrt(distanceSquared);
+    vec3 irradiance = light.intensity / distanceSquared;
+    if (IsRough(data)) return ComputeRoughDirect(data, viewDir, lightDir) * irradiance;
+    return ComputeDirect(ComputeSpecularReflectionDirect(data, viewDir, lightDir), data, viewDir) * irradiance;
 }
 
 // Everything that leaves `position` towards the viewer; with `direct`, point lights included.
-vec3 ComputeLighting(SurfaceData data, vec3 viewDir, vec3 position, bool direct)
+vec3 ComputeLighting(SurfaceData data, vec3 viewDir, vec3 position, uvec2 pixel, bool direct)
 {
-    vec3 lighting = ComputeBSDFLight(data, viewDir);
+    vec3 lighting = IsRough(data) ? ComputeRoughBSDFLight(data, viewDir, pixel) : ComputeBSDFLight(data, viewDir);
     if (direct) {
         for (uint i = 0; i < frame.lightCount; ++i) lighting += ComputeBSDFDirect(data, viewDir, position, lights[i]);
     }

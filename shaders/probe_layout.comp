@@ -5,7 +5,7 @@
 #include "shared.glsl"
 
 layout(local_size_x = 1) in;
-layout(std430, set = 0, binding = 8) writeonly buffer OutputBuffer { float members[]; };
+layout(std430, set = 0, binding = 9) writeonly buffer OutputBuffer { float members[]; };
 
 uint next = 0;
 
@@ -32,6 +32,11 @@ void main()
     Put(frame.transmissionGreen);
     Put(frame.transmissionIntensity);
     Put(frame.flippedRatio);
+    Put(frame.seed);
+    Put(frame.normals);
+    Put(frame.normalsInAll);
+    Put(frame.environmentLevels);
+    Put(vec2(frame.environmentSize));
     // The second of two, so that the size of the first counts too.
     Put(instances[1].objectToWorld);
     Put(instances[1].normalToWorld);
@@ -44,12 +49,15 @@ void main()
     Put(instances[1].number);
     Put(materials[1].refractionIndex);
     Put(materials[1].roughness);
+    Put(materials[1].albedoTable);
     Put(lights[1].position);
     Put(lights[1].intensity);
     Put(positions[1]);
     Put(normals[1]);
     Put(triangles[1]);
+    Put(albedos[1]);
     Put(jitter);
     Put(clipOffset);
     Put(instanceIndex);
+    Put(sampleIndex);
 }

@@ -46,4 +46,14 @@ vec2 PlasticPoint(uint index, uvec2 shift)
     return vec2(UnitFloat(bits.x), UnitFloat(bits.y));
 }
 
+// Axes of a local frame whose +z is `n`, as columns: Duff et al., "Building an Orthonormal Basis, Revisited", JCGT 2017, which
+// keeps its digits also where n.z is close to -1.
+mat3 BasisAround(vec3 n)
+{
+    float side = n.z < 0.0 ? -1.0 : 1.0;
+    float a = -1.0 / (side + n.z);
+    float b = n.x * n.y * a;
+    return mat3(vec3(1.0 + side * n.x * n.x * a, side * b, -side * n.x), vec3(b, side + n.y * n.y * a, -n.y), n);
+}
+
 #endif

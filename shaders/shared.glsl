@@ -17,6 +17,12 @@ struct Frame {
     float transmissionGreen;
     float transmissionIntensity;
     uint flippedRatio;
+    uint seed;
+    uint normals;              // visible normals of a rough surface that each sample of a pixel takes
+    uint normalsInAll;         // that all samples of a pixel take; 0: not known beforehand
+    uint environmentLevels;    // of the environment's image: halves of halves below it
+    uvec2 environmentSize;     // of its first level
+    uvec2 padding;
 };
 
 struct Instance {
@@ -34,6 +40,7 @@ struct Instance {
 struct Material {
     float refractionIndex;
     float roughness;
+    uint albedoTable;          // its first node in the tables of compensation.glsl
 };
 
 struct Light {
@@ -49,11 +56,13 @@ layout(std430, set = 0, binding = 4) readonly buffer PositionBuffer { float posi
 layout(std430, set = 0, binding = 5) readonly buffer NormalBuffer { float normals[]; };
 layout(std430, set = 0, binding = 6) readonly buffer TriangleBuffer { uint triangles[]; };
 layout(set = 0, binding = 7) uniform texture2D environment;
+layout(std430, set = 0, binding = 8) readonly buffer AlbedoBuffer { float albedos[]; };
 
 layout(push_constant) uniform Push {
     vec2 jitter;               // of this sample inside the pixel, in pixels from its centre
     vec2 clipOffset;           // the same in clip space
     uint instanceIndex;
+    uint sampleIndex;
 };
 
 #endif

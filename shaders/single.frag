@@ -17,11 +17,14 @@ void main()
 
     SurfaceData data;
     data.normal = hit.normal;
+    data.behind = hit.behind;
     data.refractionIndex = material.refractionIndex;
     data.roughness = material.roughness;
+    data.albedoTable = material.albedoTable;
     data.reflectionRed = frame.reflectionRed;
     data.reflectionIntensity = frame.reflectionIntensity;
     data.refractionGreen = frame.transmissionGreen;
     data.refractionIntensity = frame.transmissionIntensity;
-    outRadiance = vec4(ComputeLighting(data, -normalize(ray), hit.position, /* direct */ DIRECT_LIGHT), 1.0);
+    uvec2 pixel = uvec2(gl_FragCoord.xy);
+    outRadiance = vec4(ComputeLighting(data, -normalize(ray), hit.position, pixel, /* direct */ DIRECT_LIGHT), 1.0);
 }

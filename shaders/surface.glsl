@@ -9,6 +9,7 @@ struct Hit {
     float t;        // in lengths of the ray's direction
     vec3 position;
     vec3 normal;    // of unit length, towards the outside of the surface; interpolated where the object is smooth
+    bool behind;    // the triangle is seen from the inside
 };
 
 vec3 FetchPosition(uint vertex)
@@ -45,6 +46,7 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
     Hit hit;
     hit.t = dot(edge2, q) * inverse;
     hit.position = hit.t * direction;
+    hit.behind = determinant < 0.0;
     vec3 normal = normalize(cross(edge1, edge2));
     if (instance.smoothNormals != 0) {
         // A pixel's centre may lie just outside of the triangle that the rasteriser chose, where normals go on as they are

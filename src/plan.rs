@@ -1,5 +1,6 @@
 //! What one render does: scene and options, with every default filled in and every conflict refused.
 
+use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use crate::effects::{Effect, Effects};
@@ -62,7 +63,22 @@ impl Budget {
 /// Samples that a time budget ends with at the latest.
 const MOST_SAMPLES: u32 = 1 << 20;
 
+/// Visible normals that all samples of a pixel should take of a rough surface.
+const NORMALS: u32 = 64;
+
+/// Visible normals that one sample takes, at least and at most.
+const NORMALS_A_SAMPLE: RangeInclusive<u32> = 4..=16;
+
 impl Plan {
+    /// Visible normals of a rough surface that each sample of a pixel takes.
+    pub fn normals(&self) -> u32 {
+        let (least, most) = (*NORMALS_A_SAMPLE.start(), *NORMALS_A_SAMPLE.end());
+        match self.budget {
+            Budget::Samples(samples) => NORMALS.div_ceil(samples).clamp(least, most),
+            Budget::Seconds { .. } => most,
+        }
+    }
+
     /// What `args` amount to for `scene`; the scene's own `[render]` table is not looked at, see [`RenderArgs::or`].
     pub fn new(scene: &Scene, args: &RenderArgs) -> Result<Self> {
         let model = args.model.unwrap_or(Model::Single);

@@ -40,6 +40,12 @@ pub struct Frame {
     pub transmission_green: f32,
     pub transmission_intensity: f32,
     pub flipped_ratio: u32,
+    pub seed: u32,
+    pub normals: u32,
+    pub normals_in_all: u32,
+    pub environment_levels: u32,
+    pub environment_size: [u32; 2],
+    pub padding: [u32; 2],
 }
 
 impl Frame {
@@ -72,6 +78,7 @@ pub struct InstanceRecord {
 pub struct MaterialRecord {
     pub refraction_index: f32,
     pub roughness: f32,
+    pub albedo_table: u32,
 }
 
 /// `Light`: a point light.
@@ -93,4 +100,5 @@ pub struct SamplePush {
     pub jitter: Vec2,
     pub clip_offset: Vec2,
     pub instance_index: u32,
+    pub sample_index: u32,
 }

@@ -2,6 +2,7 @@
 //!
 //! In flow directions of unit length, cosines and indices; out flow directions and shares of light, from 0 to 1 unless said.
 
+pub mod compensation;
 pub mod fresnel;
 pub mod medium;
 pub mod microfacet;

@@ -60,7 +60,7 @@ impl AovPass {
             ImageDesc { name: "depth of aov", width, height, format: Format::Depth32, uses: &[Use::DepthTarget] };
         let depth = Image::new(&gpu, &desc)?;
         let clear = Some([0.0; 4]);
-        let push = view::sample_push(size, DVec2::ZERO);
+        let push = view::sample_push(size, DVec2::ZERO, 0);
         let time = commands.run(|cmd| {
             cmd.timed("aov", |cmd| {
                 let colors = [Target { image: &normal_depth, clear }, Target { image: &object, clear }];

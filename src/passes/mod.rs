@@ -83,8 +83,8 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
     let mut times = Times::default();
     let mut samples = 0;
     for offset in sampling::pixel_offsets(plan.budget, plan.seed) {
-        let push = view::sample_push(plan.size, offset);
-        times.add(commands.run(|cmd| passes.sample(cmd, &resources, &targets, &resources.draws, push, samples))?);
+        let push = view::sample_push(plan.size, offset, samples);
+        times.add(commands.run(|cmd| passes.sample(cmd, &resources, &targets, &resources.draws, push))?);
         samples += 1;
         progress(samples);
         if is_spent(plan.budget, set_up, start.elapsed(), samples) {
@@ -128,7 +128,7 @@ impl Passes {
         };
         let few: Vec<_> =
             resources.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect();
-        commands.run(|cmd| passes.sample(cmd, resources, &targets, &few, SamplePush::default(), 0))?;
+        commands.run(|cmd| passes.sample(cmd, resources, &targets, &few, SamplePush::default()))?;
         passes.display.run(commands, &targets, plan)?;
         if let Some(aov) = &passes.aov {
             aov.run(commands, resources, &few, small)?;
@@ -143,11 +143,10 @@ impl Passes {
         targets: &'r Targets,
         draws: &[Draw],
         push: SamplePush,
-        index: u32,
     ) {
         cmd.timed("single", |cmd| self.single.record(cmd, resources, targets, draws, push));
         cmd.timed("environment", |cmd| self.environment.record(cmd, resources, targets, push));
-        cmd.timed("accumulate", |cmd| self.accumulate.record(cmd, targets, index));
+        cmd.timed("accumulate", |cmd| self.accumulate.record(cmd, targets, push.sample_index));
     }
 }
 

@@ -6,12 +6,15 @@ use glam::{DAffine3, DMat3, DVec3, Vec3};
 use half::f16;
 
 use super::view::View;
+use crate::effects::{Effect, SMOOTH};
 use crate::gpu::{
-    Bind, BindGroup, Commands, Format, Frame, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord, Result,
-    Sides, Specialization, Use,
+    Bind, BindGroup, Commands, Format, Frame, Gpu, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord,
+    Result, Sides, Specialization, Use,
 };
-use crate::plan::Plan;
-use crate::scene::{Dielectric, Mesh, Panorama, Scene, Surface, Surroundings};
+use crate::optics::compensation::AlbedoTable;
+use crate::optics::rough::RoughInterface;
+use crate::plan::{Budget, Plan};
+use crate::scene::{Dielectric, Material, Mesh, Panorama, Scene, Surface, Surroundings};
 
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
@@ -30,12 +33,19 @@ impl Resources {
     pub(super) fn new(commands: &mut Commands, scene: &Scene, plan: &Plan) -> Result<Self> {
         let view = View::new(&scene.camera, scene.bounds(), plan.size);
         let geometry = Geometry::new(scene, &view);
-        let materials: Vec<_> = scene.materials.iter().map(|material| material_record(&material.surface)).collect();
+        let (materials, albedos) = materials(scene, plan);
         let lights = lights(scene, &view);
-        let frame = frame(scene, plan, &view, lights.len() as u32);
-        let (environment, specialization) = match &scene.environment.light {
-            Surroundings::Image(panorama) => (upload_panorama(commands, panorama)?, true),
-            Surroundings::Color(_) => (upload_panorama(commands, &Panorama::new(1, 1, vec![[1.0; 3]]))?, false),
+        let single = Panorama::new(1, 1, vec![[1.0; 3]]);
+        let (panorama, specialization) = match &scene.environment.light {
+            Surroundings::Image(panorama) => (panorama, true),
+            Surroundings::Color(_) => (&single, false),
+        };
+        let levels = levels(commands.gpu(), panorama, plan);
+        let environment = upload_panorama(commands, panorama, levels)?;
+        let frame = Frame {
+            environment_size: [panorama.width, panorama.height],
+            environment_levels: levels,
+            ..frame(scene, plan, &view, lights.len() as u32)
         };
         let buffers = vec![
             commands.upload_buffer("frame", &[frame])?,
@@ -49,6 +59,7 @@ impl Resources {
         commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
         let mut bindings: Vec<_> = buffers.into_iter().map(|buffer| Bind::Buffer(Arc::new(buffer))).collect();
         bindings.push(Bind::Sampled(Arc::new(environment)));
+        bindings.push(Bind::Buffer(Arc::new(commands.upload_buffer("albedos", &albedos)?)));
         Ok(Self {
             group: BindGroup::new(commands.gpu(), "scene", bindings)?,
             draws: geometry.draws,
@@ -144,13 +155,22 @@ struct Place {
     to_mesh: DAffine3,
 }
 
-fn material_record(surface: &Surface) -> MaterialRecord {
-    match surface {
-        Surface::Dielectric(Dielectric { ior, roughness, .. }) => {
-            MaterialRecord { refraction_index: *ior as f32, roughness: *roughness as f32 }
+/// Materials, and the tables of what rough ones lose, for those that objects wear.
+fn materials(scene: &Scene, plan: &Plan) -> (Vec<MaterialRecord>, Vec<f32>) {
+    let mut albedos = Vec::new();
+    let mut record = |(i, material): (usize, &Material)| {
+        let Surface::Dielectric(Dielectric { ior, roughness, .. }) = material.surface else {
+            return MaterialRecord::default();
+        };
+        let albedo_table = albedos.len() as u32;
+        let worn = scene.objects.iter().any(|object| object.material == i);
+        if worn && roughness > SMOOTH && ior != 1.0 && plan.effects.contains(Effect::EnergyCompensation) {
+            let interface = RoughInterface { alpha: roughness * roughness, eta_i: 1.0, eta_t: ior };
+            albedos.extend(AlbedoTable::new(interface).nodes().map(|albedo| albedo as f32));
         }
-        Surface::Opaque(_) => MaterialRecord::default(),
-    }
+        MaterialRecord { refraction_index: ior as f32, roughness: roughness as f32, albedo_table }
+    };
+    (scene.materials.iter().enumerate().map(&mut record).collect(), albedos)
 }
 
 fn lights(scene: &Scene, view: &View) -> Vec<LightRecord> {
@@ -184,26 +204,58 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         transmission_green: plan.debug.transmission_green,
         transmission_intensity: plan.debug.transmission_intensity,
         flipped_ratio: plan.debug.flipped_ratio.into(),
+        seed: (plan.seed ^ (plan.seed >> 32)) as u32,
+        normals: plan.normals(),
+        normals_in_all: match plan.budget {
+            Budget::Samples(samples) => samples.saturating_mul(plan.normals()),
+            Budget::Seconds { .. } => 0,
+        },
+        ..Frame::default()
     }
 }
 
-/// In half precision where that loses nothing, as with images that came in it.
-fn upload_panorama(commands: &mut Commands, panorama: &Panorama) -> Result<Image> {
+/// The panorama; with `levels` above 1 it has its halves below, side by side, as `shaders/environment.glsl` finds them. An image
+/// of its own levels would do if drivers fetched each pixel of a quad from the level that it asks for; lavapipe takes one for all.
+fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) -> Result<Image> {
     let is_half = |value: &f32| f16::from_f32(*value).to_f32() == *value;
-    let desc = ImageDesc {
-        name: "environment",
-        width: panorama.width,
-        height: panorama.height,
-        format: Format::Rgba32Float,
-        uses: &[Use::CopyTarget, Use::Sampled],
-    };
-    if panorama.texels.iter().flatten().all(is_half) {
-        let one = f16::ONE.to_bits();
-        let bits = |value: f32| f16::from_f32(value).to_bits();
-        let texels: Vec<[u16; 4]> = panorama.texels.iter().map(|&[r, g, b]| [bits(r), bits(g), bits(b), one]).collect();
-        let desc = ImageDesc { format: Format::Rgba16Float, ..desc };
-        return commands.upload_image(&desc, bytemuck::cast_slice(&texels));
+    // In half precision where that loses nothing, as with images that came in it.
+    let half = panorama.texels.iter().flatten().all(is_half);
+    let format = if half { Format::Rgba16Float } else { Format::Rgba32Float };
+    let width = panorama.width;
+    let height = panorama.height + if levels > 1 { panorama.height / 2 } else { 0 };
+    let desc = ImageDesc { name: "environment", width, height, format, uses: &[Use::CopyTarget, Use::Sampled] };
+    if levels <= 1 {
+        return commands.upload_image(&desc, &pack(&panorama.texels, half));
     }
-    let texels: Vec<[f32; 4]> = panorama.texels.iter().map(|&[r, g, b]| [r, g, b, 1.0]).collect();
-    commands.upload_image(&desc, bytemuck::cast_slice(&texels))
+    let mut texels = panorama.texels.clone();
+    texels.resize((width * height) as usize, [0.0; 3]);
+    let mut level = panorama.halved();
+    for i in 1..levels {
+        let left = width - (width >> (i - 1));
+        for (y, row) in (panorama.height..).zip(level.texels.chunks(level.width as usize)) {
+            let start = (y * width + left) as usize;
+            texels[start..start + row.len()].copy_from_slice(row);
+        }
+        level = level.halved();
+    }
+    commands.upload_image(&desc, &pack(&texels, half))
+}
+
+/// Levels of the panorama that rough surfaces see averages of; 1 where nothing is rough, or where they would not fit.
+fn levels(gpu: &Gpu, panorama: &Panorama, plan: &Plan) -> u32 {
+    let fits = panorama.height + panorama.height / 2 <= gpu.max_image_side();
+    if plan.effects.contains(Effect::Roughness) && fits { panorama.width.min(panorama.height).ilog2() + 1 } else { 1 }
+}
+
+/// Texels as an image holds them.
+fn pack(texels: &[[f32; 3]], half: bool) -> Vec<u8> {
+    if half {
+        let bits = |value: f32| f16::from_f32(value).to_bits();
+        texels
+            .iter()
+            .flat_map(|&[r, g, b]| bytemuck::cast::<_, [u8; 8]>([bits(r), bits(g), bits(b), bits(1.0)]))
+            .collect()
+    } else {
+        texels.iter().flat_map(|&[r, g, b]| bytemuck::cast::<_, [u8; 16]>([r, g, b, 1.0])).collect()
+    }
 }

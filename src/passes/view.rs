@@ -48,12 +48,12 @@ impl View {
     }
 }
 
-/// What a sample at `offset` from the pixels' centres tells the shaders.
-pub(super) fn sample_push(size: Size, offset: DVec2) -> SamplePush {
+/// What sample `sample_index`, at `offset` from the pixels' centres, tells the shaders.
+pub(super) fn sample_push(size: Size, offset: DVec2, sample_index: u32) -> SamplePush {
     // The scene moves against the offset, and up is up in clip space.
     let clip = DVec2::new(-2.0 * offset.x / f64::from(size.width), 2.0 * offset.y / f64::from(size.height));
     let narrow = |v: DVec2| Vec2::new(v.x as f32, v.y as f32);
-    SamplePush { jitter: narrow(offset), clip_offset: narrow(clip), instance_index: 0 }
+    SamplePush { jitter: narrow(offset), clip_offset: narrow(clip), instance_index: 0, sample_index }
 }
 
 #[cfg(test)]
@@ -85,7 +85,7 @@ mod tests {
 
     #[test]
     fn the_scene_moves_against_the_jitter() {
-        let push = sample_push(Size { width: 100, height: 50 }, DVec2::new(0.25, 0.25));
+        let push = sample_push(Size { width: 100, height: 50 }, DVec2::new(0.25, 0.25), 0);
         assert_eq!(push.clip_offset, Vec2::new(-0.005, 0.01));
     }
 }

@@ -98,11 +98,79 @@ impl Panorama {
         }
         Self { width, height, texels, repaired }
     }
+
+    /// The next level of a mip chain: half as wide and high, rounded down, and at least 1; texels are means over the solid angle
+    /// that they cover.
+    #[must_use]
+    pub fn halved(&self) -> Self {
+        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
+        let columns = shares(self.width, width, |edge| edge);
+        // A row between v and v + dv covers cos(pi v) - cos(pi (v + dv)).
+        let rows = shares(self.height, height, |edge| -(edge * std::f64::consts::PI).cos());
+        let mean = |(row, column): (&Vec<(u32, f64)>, &Vec<(u32, f64)>)| {
+            let mut sum = [0.0; 3];
+            for &(y, across) in row {
+                for &(x, along) in column {
+                    let texel = self.texels[(y * self.width + x) as usize];
+                    (0..3).for_each(|i| sum[i] += across * along * f64::from(texel[i]));
+                }
+            }
+            sum.map(|value| value as f32)
+        };
+        let texels = rows.iter().flat_map(|row| columns.iter().map(move |column| mean((row, column)))).collect();
+        Self { width, height, texels, repaired: Repairs::default() }
+    }
+}
+
+/// For each of `to` intervals of equal length the intervals of `from` that it overlaps, each with its share of it; `measure` says how
+/// much lies before a point from 0 to 1.
+fn shares(from: u32, to: u32, measure: impl Fn(f64) -> f64) -> Vec<Vec<(u32, f64)>> {
+    let (many, few) = (f64::from(from), f64::from(to));
+    (0..to)
+        .map(|i| {
+            let (start, end) = (f64::from(i) / few, f64::from(i + 1) / few);
+            let whole = measure(end) - measure(start);
+            let last = ((end * many).ceil() as u32).min(from);
+            ((start * many) as u32..last)
+                .map(|j| {
+                    let (low, high) = ((f64::from(j) / many).max(start), (f64::from(j + 1) / many).min(end));
+                    (j, (measure(high) - measure(low)) / whole)
+                })
+                .collect()
+        })
+        .collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn halves_keep_the_light() {
+        // Odd sides and a bright spot: the light over the whole sphere stays, down to one texel.
+        let light = |panorama: &Panorama| {
+            let edge = |row: u32| -(std::f64::consts::PI * f64::from(row) / f64::from(panorama.height)).cos();
+            let row_light = |row: u32| {
+                let texels = &panorama.texels[(row * panorama.width) as usize..((row + 1) * panorama.width) as usize];
+                let mean = texels.iter().map(|texel| f64::from(texel[1])).sum::<f64>() / f64::from(panorama.width);
+                mean * (edge(row + 1) - edge(row)) / 2.0
+            };
+            (0..panorama.height).map(row_light).sum::<f64>()
+        };
+        let mut texels = vec![[0.5; 3]; 13 * 7];
+        texels[13 * 2 + 5] = [100.0; 3];
+        let mut panorama = Panorama::new(13, 7, texels);
+        let whole = light(&panorama);
+        let mut sizes = Vec::new();
+        while panorama.width > 1 {
+            panorama = panorama.halved();
+            sizes.push((panorama.width, panorama.height));
+            assert!((light(&panorama) / whole - 1.0).abs() < 1e-6, "{sizes:?}");
+        }
+        assert_eq!(sizes, [(6, 3), (3, 1), (1, 1)]);
+        let white = Panorama::new(5, 3, vec![[1.0; 3]; 15]).halved();
+        assert!(white.texels.iter().flatten().all(|value| (value - 1.0).abs() < 1e-6));
+    }
 
     #[test]
     fn texels_are_repaired_and_counted() {

@@ -1,0 +1,32 @@
+// What a single bounce between microfacets loses, given back: E. Turquin, "Practical multiple scattering compensation for
+// microfacet models" (2019). src/optics/compensation.rs makes the tables.
+#ifndef COMPENSATION_GLSL
+#define COMPENSATION_GLSL
+
+#include "shared.glsl"
+
+// Nodes of a table, at cosines (i / (ALBEDO_NODES - 1))^3.
+const uint ALBEDO_NODES = 96;
+
+float AlbedoNode(uint i)
+{
+    float root = float(i) / float(ALBEDO_NODES - 1);
+    return root * root * root;
+}
+
+// The share of power that leaves a rough surface after one bounce when light comes at an angle of cosine `cosThetaI`.
+float RoughAlbedo(uint table, float cosThetaI)
+{
+    float cosine = clamp(cosThetaI, 0.0, 1.0);
+    uint low = min(uint(pow(cosine, 1.0 / 3.0) * float(ALBEDO_NODES - 1)), ALBEDO_NODES - 2);
+    float share = (cosine - AlbedoNode(low)) / (AlbedoNode(low + 1) - AlbedoNode(low));
+    return mix(albedos[table + low], albedos[table + low + 1], share);
+}
+
+// The factor that gives back what is lost; a table holds nothing below the share that a direction along the surface sees.
+float RoughCompensation(uint table, float cosThetaI)
+{
+    return 1.0 / max(RoughAlbedo(table, cosThetaI), 1e-6);
+}
+
+#endif
