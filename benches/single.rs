@@ -1,6 +1,6 @@
 //! What the original model costs: `cargo bench --bench single` prints the README's table.
 //!
-//! The built-in scene and the same view without objects, the floor, take turns in one process; medians of the rounds,
+//! The built-in scene, the same with rough glass, and the same view without objects, the floor, take turns in one process; medians of the rounds,
 //! device times, pipelines warm. Then whole runs of the program: from its start to the finished file.
 
 use std::path::Path;
@@ -11,7 +11,7 @@ use vitrum::gpu::{Gpu, Instance};
 use vitrum::options::{RenderArgs, Size};
 use vitrum::passes::render;
 use vitrum::plan::Plan;
-use vitrum::scene::{Overrides, Scene};
+use vitrum::scene::{Overrides, Scene, Surface};
 
 const ROUNDS: usize = 9;
 
@@ -23,22 +23,35 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let floor = Scene { objects: Vec::new(), ..scene.clone() };
 
     println!("{}, {}; medians of {ROUNDS} rounds\n", gpu.info().name, gpu.info().driver);
-    println!("| 1024x768 | 1 sample | 16 samples |\n| --- | --- | --- |");
-    let mut rows = [("scene, all passes", vec![]), ("environment alone, all passes (floor)", vec![])];
+    let mut rough = scene.clone();
+    for material in &mut rough.materials {
+        if let Surface::Dielectric(dielectric) = &mut material.surface {
+            dielectric.roughness = 0.3;
+        }
+    }
+    let mut rows = [
+        ("scene", &scene, vec![]),
+        ("scene at roughness 0.3", &rough, vec![]),
+        ("environment alone (floor)", &floor, vec![]),
+    ];
+    println!("| 1024x768, all passes | 1 sample | 16 samples |\n| --- | --- | --- |");
     for samples in [1, 16] {
-        let mut times = [vec![], vec![]];
+        let mut times = [vec![], vec![], vec![]];
         for _ in 0..ROUNDS {
-            times[0].push(gpu_ms(&gpu, &scene, samples)?);
-            times[1].push(gpu_ms(&gpu, &floor, samples)?);
+            for ((_, scene, _), times) in rows.iter().zip(&mut times) {
+                times.push(gpu_ms(&gpu, scene, samples)?);
+            }
         }
         for (row, times) in rows.iter_mut().zip(times) {
-            row.1.push(median(times));
+            row.2.push(median(times));
         }
     }
-    for (name, times) in &rows {
+    for (name, _, times) in &rows {
         println!("| {name} | {:.1} ms | {:.1} ms |", times[0], times[1]);
     }
-    println!("| ratio | {:.1} | {:.1} |\n", rows[0].1[0] / rows[1].1[0], rows[0].1[1] / rows[1].1[1]);
+    let ratio = |a: usize, b: usize, column: usize| rows[a].2[column] / rows[b].2[column];
+    println!("| scene over floor | {:.1} | {:.1} |", ratio(0, 2, 0), ratio(0, 2, 1));
+    println!("| rough over smooth | {:.1} | {:.1} |\n", ratio(1, 0, 0), ratio(1, 0, 1));
     drop((gpu, instance));
 
     println!("| program start to finished PNG, 1 sample | time | peak memory |\n| --- | --- | --- |");

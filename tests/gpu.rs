@@ -42,6 +42,7 @@ struct Records {
     position: f32,
     normal: f32,
     triangle: u32,
+    albedo: f32,
     push: SamplePush,
 }
 
@@ -66,6 +67,12 @@ impl Records {
                 transmission_green: n.next(),
                 transmission_intensity: n.next(),
                 flipped_ratio: n.next() as u32,
+                seed: n.next() as u32,
+                normals: n.next() as u32,
+                normals_in_all: n.next() as u32,
+                environment_levels: n.next() as u32,
+                environment_size: [n.next() as u32, n.next() as u32],
+                ..Frame::zeroed()
             },
             instance: InstanceRecord {
                 object_to_world: n.matrix().into(),
@@ -78,12 +85,18 @@ impl Records {
                 smooth_normals: n.next() as u32,
                 number: n.next() as u32,
             },
-            material: MaterialRecord { refraction_index: n.next(), roughness: n.next() },
+            material: MaterialRecord { refraction_index: n.next(), roughness: n.next(), albedo_table: n.next() as u32 },
             light: LightRecord { position: n.vector(), intensity: n.vector(), ..LightRecord::zeroed() },
             position: n.next(),
             normal: n.next(),
             triangle: n.next() as u32,
-            push: SamplePush { jitter: pair(&mut n), clip_offset: pair(&mut n), instance_index: n.next() as u32 },
+            albedo: n.next(),
+            push: SamplePush {
+                jitter: pair(&mut n),
+                clip_offset: pair(&mut n),
+                instance_index: n.next() as u32,
+                sample_index: n.next() as u32,
+            },
         };
         (records, n.0 as usize)
     }
@@ -111,7 +124,8 @@ fn probe(gpu: &Gpu, records: &Records, count: usize, wait: bool) -> vitrum::gpu:
     let environment = Arc::new(environment);
     let output = Arc::new(output);
     let mut bindings: Vec<_> = buffers.into_iter().map(|buffer| Bind::Buffer(Arc::new(buffer))).collect();
-    bindings.extend([Bind::Sampled(environment.clone()), Bind::Buffer(output.clone())]);
+    let albedos = Arc::new(commands.upload_buffer("albedos", &[0.0, records.albedo])?);
+    bindings.extend([Bind::Sampled(environment.clone()), Bind::Buffer(albedos), Bind::Buffer(output.clone())]);
     let group = BindGroup::new(gpu, "probe", bindings)?;
     let push_bytes = size_of::<SamplePush>() as u32;
     let shader = &shaders::PROBE_LAYOUT_COMP;

@@ -76,6 +76,15 @@ impl AlbedoTable {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::effects::SMOOTH;
+
+    #[test]
+    fn shaders_have_the_same_nodes_and_the_same_threshold() {
+        let nodes = include_str!("../../shaders/compensation.glsl");
+        assert!(nodes.contains(&format!("const uint ALBEDO_NODES = {NODES};")));
+        let threshold = include_str!("../../shaders/bsdf.glsl");
+        assert!(threshold.contains(&format!("const float SMOOTH_ROUGHNESS = {SMOOTH};")));
+    }
 
     /// With the table a white furnace is white within 1 %, from normal incidence to 89.9 degrees.
     #[test]
