@@ -186,7 +186,7 @@ impl NumericsReport {
 }
 
 /// Columns of the table that hold names.
-const NAME: usize = 52;
+const NAME: usize = 50;
 /// Inputs of which a row has room for that many.
 const INLINE: usize = 2;
 
