@@ -7,11 +7,13 @@ use super::numerics::{bound, named_cause, number};
 
 const STYLE: &str = "\
 body { font: 15px/1.45 sans-serif; color: #222; max-width: 1320px; margin: 2em auto; padding: 0 1em }
-svg { width: 100%; height: auto }
+svg { max-width: 100%; height: auto }
 table { border-collapse: collapse; width: 100% }
 th, td { text-align: left; padding: .15em .8em .15em 0; border-bottom: 1px solid #e5e5e5; vertical-align: top }
-th.n, td.n { text-align: right; font-variant-numeric: tabular-nums; white-space: nowrap }
-th.region { padding-top: 1.2em; border-bottom: 1px solid #888 }
+th { vertical-align: bottom; border-bottom-color: #888 }
+th.n, td.n { text-align: right; padding-left: 1em; font-variant-numeric: tabular-nums; white-space: nowrap }
+th.region, td:first-child { white-space: nowrap }
+th.region { padding-top: 1.4em }
 td.cause { font: 12px monospace; color: #555; padding-top: .4em }
 tr.comparison td { color: #777 }
 tr.broken td { background: #fdd; color: #900; font-weight: bold }";
