@@ -149,7 +149,7 @@ impl std::fmt::Display for Size {
 /// Parsers of values with a range.
 macro_rules! ranges {
     ($($name:ident: $type:ty, $ok:expr, $wanted:literal;)*) => {
-        mod range {
+        pub(crate) mod range {
             $(pub fn $name(text: &str) -> Result<$type, String> {
                 let value: $type = text.trim().parse().map_err(|_| format!("expected {}", $wanted))?;
                 let ok: fn($type) -> bool = $ok;
@@ -164,6 +164,7 @@ ranges! {
     max_depth: u32, |x| (1..=1 << 16).contains(&x), "a depth from 1 to 65536";
     positive: f64, |x| x > 0.0 && x.is_finite(), "a number above 0";
     unit: f64, |x| (0.0..=1.0).contains(&x), "a number from 0 to 1";
+    inputs: u64, |x| (1..=1 << 40).contains(&x), "1 to 1099511627776 inputs";
     seed: u64, |_| true, "a whole number from 0 to 18446744073709551615";
     ior: f64, |x| (1e-6..=1e6).contains(&x), "an index above 0, from 1e-6 to 1e6";
     exposure: f64, |x| (-64.0..=64.0).contains(&x), "an exposure from -64 to 64 EV";

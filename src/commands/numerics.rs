@@ -9,33 +9,37 @@ use super::{Talk, devices, print};
 use crate::gpu::{Gpu, Instance};
 use crate::image::OutputFile;
 use crate::numerics::{FUNCTIONS, Function, suite};
-use crate::report::{NumericsReport, evaluate_table};
+use crate::options::range;
+use crate::report::{NumericsFiles, NumericsReport, evaluate_table};
 use crate::{Error, Result};
+
+/// Inputs in each region: 10^8 and more in all.
+const COUNT: u64 = 2_750_000;
 
 /// Options of `vitrum numerics`.
 #[derive(Debug, Args)]
-#[command(after_long_help = functions_help())]
+#[command(allow_negative_numbers = true, after_long_help = functions_help())]
 pub(super) struct NumericsCommand {
-    /// One function instead of all; with --inputs, evaluated there
+    /// One function instead of all
     #[arg(long, value_name = "NAME")]
     function: Option<String>,
 
-    /// A CSV file with a column for each input of the function; further columns are passed through
-    #[arg(long, value_name = "IN.csv", requires = "function")]
+    /// A CSV file with a column for each input of --function, which is evaluated there; further columns are passed through
+    #[arg(long, value_name = "IN.csv")]
     inputs: Option<PathBuf>,
 
-    /// With --inputs the CSV file of the results, else a folder for numerics.json and plots of error against angle;
-    /// [default: standard output]
+    /// With --inputs the CSV file of the results [default: standard output]; else a folder for numerics.json, numerics.svg (plots of
+    /// error against angle) and index.html
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
 
-    /// Inputs tried in each region of a function
-    #[arg(long, value_name = "N", default_value_t = 2_750_000, value_parser = clap::value_parser!(u64).range(1..=1 << 40))]
-    count: u64,
+    /// Inputs tried in each region of a function [default: 2750000]
+    #[arg(long, value_name = "N", value_parser = range::inputs)]
+    count: Option<u64>,
 
-    /// Seed of the inputs
-    #[arg(long, value_name = "N", default_value_t = 0)]
-    seed: u64,
+    /// Seed of the inputs [default: 0]
+    #[arg(long, value_name = "N", value_parser = range::seed)]
+    seed: Option<u64>,
 
     /// Vulkan device: part of its name, its index, or "list" [default: the best one]
     #[arg(long, value_name = "NAME|INDEX|list", env = "VITRUM_DEVICE")]
@@ -55,6 +59,11 @@ impl NumericsCommand {
             Some(name) => Some(Function::named(name).map_err(|error| Error::Usage(format!("--function: {error}")))?),
             None => None,
         };
+        if self.inputs.is_some() && function.is_none() {
+            let known: Vec<_> = FUNCTIONS.iter().map(|function| function.name).collect();
+            let message = format!("--inputs are those of one function; add --function, one of {}", known.join(", "));
+            return Err(Error::Usage(message));
+        }
         let open = || -> Result<_> {
             let instance = Instance::new(self.validation)?;
             let gpu = Gpu::open(&instance, instance.choose(self.device.as_deref())?)?;
@@ -69,6 +78,12 @@ impl NumericsCommand {
                 }
                 let table = evaluate_table::Table::read(function, inputs)?;
                 let (instance, gpu) = open()?;
+                for (given, name) in [(self.count, "--count"), (self.seed, "--seed")] {
+                    if given.is_some() {
+                        talk.note(&format!("note: {name} changes nothing: --inputs says what is evaluated"));
+                    }
+                }
+                talk.detail(&format!("device: {} ({})", gpu.info().name, gpu.info().driver));
                 let text = table.evaluate(&gpu)?;
                 match &output {
                     Some(output) => output.write(text.as_bytes())?,
@@ -77,18 +92,19 @@ impl NumericsCommand {
                 (instance.messages(), Ok(()))
             }
             _ => {
-                let folder = self.output.as_deref().map(crate::report::folder).transpose()?;
+                self.output.as_deref().map(NumericsFiles::check).transpose()?;
                 let (instance, gpu) = open()?;
+                let files = self.output.as_deref().map(NumericsFiles::new).transpose()?;
                 talk.detail(&format!("device: {} ({})", gpu.info().name, gpu.info().driver));
+                let (count, seed) = (self.count.unwrap_or(COUNT), self.seed.unwrap_or(0));
                 let bar = self.progress_bar(talk);
-                let regions = suite::run(&gpu, self.function.as_deref(), self.count, self.seed, &mut |done| {
-                    bar.set_position(done)
-                })?;
+                let only = self.function.as_deref();
+                let regions = suite::run(&gpu, only, count, seed, &mut |done| bar.set_position(done))?;
                 bar.finish_and_clear();
-                let report = NumericsReport::new(gpu.info(), self.seed, regions);
-                print(&report.table())?;
-                if let Some(folder) = folder {
-                    report.write(&folder)?;
+                let report = NumericsReport::new(gpu.info(), seed, regions);
+                print(&report.table(talk.verbose > 0))?;
+                if let Some(files) = files {
+                    report.write(&files)?;
                 }
                 (instance.messages(), report.verdict())
             }

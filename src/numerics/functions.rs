@@ -179,7 +179,8 @@ impl Function {
                 continue;
             };
             let length = vector.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
-            if (length - 1.0).abs() > 1e-4 {
+            // Three digits a component are enough to be taken for one.
+            if (length - 1.0).abs() > 1e-3 {
                 return Err(format!("{direction} has length {length}: expected a direction of length 1"));
             }
         }

@@ -13,4 +13,4 @@ pub mod suite;
 pub use functions::{FUNCTIONS, Function};
 pub use measures::{Measure, ulps};
 pub use probe::Probe;
-pub use regions::Region;
+pub use regions::{REGIONS, Region};

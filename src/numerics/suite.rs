@@ -1,7 +1,10 @@
 //! Every region of every function: what is the worst, where, and is it within bounds?
 
+use std::iter;
 use std::num::NonZero;
-use std::thread;
+use std::panic::resume_unwind;
+use std::sync::{Mutex, PoisonError};
+use std::thread::{self, ScopedJoinHandle};
 
 use fastrand::Rng;
 
@@ -13,8 +16,8 @@ use crate::gpu::{Gpu, Result};
 /// Errors are kept by the angle of incidence, one bin a degree.
 pub const ANGLES: usize = 90;
 
-/// Evaluations that one thread generates or compares at a time; each batch has its own seed, so that results do not depend
-/// on how many threads there are.
+/// Evaluations that one thread generates or compares at a time. Each batch has a seed and a tally of its own, and tallies are merged
+/// in order: results do not depend on how many threads there are.
 const BATCH: usize = 1 << 13;
 
 /// Evaluations between two dispatches.
@@ -103,80 +106,53 @@ pub fn run(
 
 fn try_region(gpu: &Gpu, function: &'static Function, region: &Region, count: u64, seed: u64) -> Result<RegionReport> {
     let mut probe = Probe::new(gpu, function)?;
+    let threads = thread::available_parallelism().map_or(1, NonZero::get);
+    let mut seeds = Rng::with_seed(seed);
     let mut all = Tally::new(region);
     let mut done = 0;
     while done < count {
         let now = (count - done).min(ROUND as u64) as usize;
-        let inputs = generate(function, region, now, seed ^ done.wrapping_mul(0x9e37_79b9_7f4a_7c15));
+        let inputs = generate(function, region, now, &mut seeds, threads);
         let outputs = probe.evaluate(&inputs)?;
-        all.merge(compare(function, region, &inputs, &outputs));
+        all.merge(compare(function, region, &inputs, &outputs, threads));
         done += now as u64;
     }
     Ok(all.report(function, region))
 }
 
-fn threads() -> usize {
-    thread::available_parallelism().map_or(1, NonZero::get)
-}
-
-/// Runs `work` on every batch, on all processors, and returns what comes out in the order of the batches.
-fn in_batches<'a, T: Send>(
-    batches: impl Iterator<Item = (&'a mut [f32], usize)>,
-    work: impl Fn(&mut [f32], usize) -> T + Sync,
-) -> Vec<T> {
-    let mut shares: Vec<Vec<(&mut [f32], usize)>> = (0..threads()).map(|_| Vec::new()).collect();
-    let many = shares.len();
-    for (i, batch) in batches.enumerate() {
-        shares[i % many].push(batch);
-    }
-    let work = &work;
-    let mut results: Vec<(usize, T)> = thread::scope(|scope| {
-        let handles: Vec<_> = shares
-            .into_iter()
-            .map(|share| {
-                scope.spawn(move || share.into_iter().map(|(batch, i)| (i, work(batch, i))).collect::<Vec<_>>())
-            })
-            .collect();
-        handles
-            .into_iter()
-            .flat_map(|handle| handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)))
-            .collect()
-    });
-    results.sort_by_key(|&(i, _)| i);
-    results.into_iter().map(|(_, result)| result).collect()
-}
-
-fn generate(function: &Function, region: &Region, count: usize, seed: u64) -> Vec<f32> {
+fn generate(function: &Function, region: &Region, count: usize, seeds: &mut Rng, threads: usize) -> Vec<f32> {
     let columns = function.inputs.len();
     let mut inputs = vec![0.0; count * columns];
-    in_batches(inputs.chunks_mut(BATCH * columns).zip(0..), |batch, i| {
-        let mut rng = Rng::with_seed(seed.wrapping_add(i as u64));
-        for row in batch.chunks_mut(columns) {
-            (region.generate)(&mut rng, row);
-        }
+    let batches: Vec<_> = inputs.chunks_mut(BATCH * columns).map(|batch| (batch, seeds.u64(..))).collect();
+    in_parallel(threads, batches, |(batch, seed)| {
+        let mut rng = Rng::with_seed(seed);
+        batch.chunks_mut(columns).for_each(|row| (region.generate)(&mut rng, row));
     });
     inputs
 }
 
-fn compare(function: &Function, region: &Region, inputs: &[f32], outputs: &[f32]) -> Tally {
+fn compare(function: &Function, region: &Region, inputs: &[f32], outputs: &[f32], threads: usize) -> Tally {
     let (columns, results) = (function.inputs.len(), function.outputs.len());
-    // The batches are read only; a thread takes its share by number.
-    let batches = inputs.len() / columns;
-    let parts = thread::scope(|scope| {
-        let step = batches.div_ceil(threads()).max(1);
-        let handles: Vec<_> = inputs
-            .chunks(step * columns)
-            .zip(outputs.chunks(step * results))
-            .map(|(inputs, outputs)| scope.spawn(move || tally(function, region, inputs, outputs)))
-            .collect();
-        let join = |handle: thread::ScopedJoinHandle<'_, Tally>| {
-            handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic))
-        };
-        handles.into_iter().map(join).collect::<Vec<_>>()
-    });
+    let batches = inputs.chunks(BATCH * columns).zip(outputs.chunks(BATCH * results)).collect();
     let mut all = Tally::new(region);
-    parts.into_iter().for_each(|part| all.merge(part));
+    for part in in_parallel(threads, batches, |(inputs, outputs)| tally(function, region, inputs, outputs)) {
+        all.merge(part);
+    }
     all
+}
+
+/// What `work` makes of each item, in the order of the items. Each thread takes the next one that is left.
+fn in_parallel<I: Send, T: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> T + Sync) -> Vec<T> {
+    let left = Mutex::new(items.into_iter().enumerate());
+    let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
+    let worker = || iter::from_fn(next).map(|(i, item)| (i, work(item))).collect::<Vec<_>>();
+    let mut results = thread::scope(|scope| {
+        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
+        let join = |worker: ScopedJoinHandle<'_, _>| worker.join().unwrap_or_else(|panic| resume_unwind(panic));
+        workers.into_iter().flat_map(join).collect::<Vec<_>>()
+    });
+    results.sort_by_key(|&(i, _)| i);
+    results.into_iter().map(|(_, result)| result).collect()
 }
 
 fn tally(function: &Function, region: &Region, inputs: &[f32], outputs: &[f32]) -> Tally {
@@ -285,5 +261,55 @@ impl Tally {
             non_finite_cause: self.non_finite_cause,
             findings: region.bounds.iter().zip(self.sums).map(finding).collect(),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn items_keep_their_order() {
+        for threads in [1, 3, 8] {
+            assert_eq!(in_parallel(threads, (0..100).collect(), |i| 2 * i), (0..200).step_by(2).collect::<Vec<_>>());
+        }
+    }
+
+    /// A device that only rounds: what the reference says, in 32 bits.
+    fn rounded(function: &Function, inputs: &[f32]) -> Vec<f32> {
+        let wide = |row: &[f32]| (function.reference)(&row.iter().map(|&x| x.into()).collect::<Vec<_>>());
+        inputs.chunks(function.inputs.len()).flat_map(wide).map(|x| x as f32).collect()
+    }
+
+    #[test]
+    fn reports_do_not_depend_on_the_number_of_threads() {
+        let region = selected(Some("fresnel")).next().expect("a region");
+        let function = Function::named(region.function).expect("a function");
+        let reports = [1, 2, 5].map(|threads| {
+            let inputs = generate(function, region, 3 * BATCH + 1, &mut Rng::with_seed(7), threads);
+            let outputs = rounded(function, &inputs);
+            compare(function, region, &inputs, &outputs, threads).report(function, region)
+        });
+        let texts = reports.each_ref().map(|report| format!("{report:?}"));
+        assert!(texts[0] == texts[1] && texts[0] == texts[2]);
+        let worst: Vec<_> = reports[0].findings[..3].iter().map(|finding| finding.worst).collect();
+        assert!(worst[0] > 0.4 && worst[0] <= 0.5 && worst[2] <= 0.5, "{worst:?}");
+    }
+
+    #[test]
+    fn what_is_not_a_number_is_the_worst_and_counted() {
+        let region = selected(Some("fresnel")).next().expect("a region");
+        let function = Function::named(region.function).expect("a function");
+        let inputs = generate(function, region, 10, &mut Rng::with_seed(0), 1);
+        let mut outputs = rounded(function, &inputs);
+        outputs[3 * 4] = f32::NAN;
+        let report = compare(function, region, &inputs, &outputs, 1).report(function, region);
+        assert_eq!((report.count, report.non_finite), (10, 1));
+        assert_eq!(report.non_finite_cause.as_deref(), Some(&inputs[2 * 4..2 * 5]));
+        assert_eq!(
+            (report.findings[0].worst, &report.findings[0].cause),
+            (f64::INFINITY, &inputs[2 * 4..2 * 5].to_vec())
+        );
+        assert!(!report.findings[0].holds() && report.findings[2].holds());
     }
 }

@@ -24,7 +24,8 @@ impl Table {
             let line = error.position().map_or(0, |position| position.line() as usize);
             let message = match error.kind() {
                 csv::ErrorKind::UnequalLengths { expected_len, len, .. } => {
-                    format!("{len} values; the header has {expected_len} columns")
+                    let values = if *len == 1 { "value" } else { "values" };
+                    format!("{len} {values}; the header has {expected_len} columns")
                 }
                 csv::ErrorKind::Utf8 { .. } => "is not UTF-8 text".to_owned(),
                 _ => error.to_string(),
@@ -32,10 +33,14 @@ impl Table {
             Error::input(path, line, message)
         };
         let text = text.strip_prefix("\u{feff}".as_bytes()).unwrap_or(&text);
-        let mut reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(text);
+        let mut reader = csv::Reader::from_reader(text);
         let header = reader.headers().map_err(|error| wrong(&error))?.clone();
+        if header.is_empty() {
+            let wanted = function.inputs.join(",");
+            return Err(Error::input(path, 1, format!("no header; the first line names columns: {wanted}")));
+        }
         let column = |name: &&str| {
-            let mut places = header.iter().enumerate().filter(|(_, column)| column == name);
+            let mut places = header.iter().enumerate().filter(|(_, column)| column.trim() == *name);
             match (places.next(), places.next()) {
                 (Some((place, _)), None) => Ok(place),
                 (None, _) => {
@@ -46,7 +51,7 @@ impl Table {
             }
         };
         let columns = function.inputs.iter().map(column).collect::<Result<Vec<_>>>()?;
-        if let Some(name) = function.outputs.iter().find(|name| header.iter().any(|column| column == **name)) {
+        if let Some(name) = function.outputs.iter().find(|name| header.iter().any(|column| column.trim() == **name)) {
             return Err(Error::input(path, 1, format!("column {name:?} is an output of {}; rename it", function.name)));
         }
         let (mut rows, mut inputs) = (Vec::new(), Vec::new());
@@ -55,10 +60,9 @@ impl Table {
             let line = row.position().map_or(0, |position| position.line() as usize);
             let first = inputs.len();
             for (&place, name) in columns.iter().zip(function.inputs) {
-                let value = row[place].parse::<f32>();
-                inputs.push(
-                    value.map_err(|_| Error::input(path, line, format!("{name} {:?} is not a number", &row[place])))?,
-                );
+                let text = row[place].trim();
+                let value = text.parse::<f32>();
+                inputs.push(value.map_err(|_| Error::input(path, line, format!("{name} {text:?} is not a number")))?);
             }
             function.check(&inputs[first..]).map_err(|message| Error::input(path, line, message))?;
             rows.push(row);
@@ -73,11 +77,29 @@ impl Table {
         let wrong = |error: csv::Error| Error::file(&self.path, "copy", std::io::Error::other(error));
         writer.write_record(self.header.iter().chain(self.function.outputs.iter().copied())).map_err(wrong)?;
         for (row, values) in self.rows.iter().zip(outputs.chunks(self.function.outputs.len())) {
-            // The shortest text that reads back as the same 32-bit float.
-            let values: Vec<_> = values.iter().map(|value| format!("{value:?}")).collect();
+            let values: Vec<_> = values.iter().copied().map(number).collect();
             writer.write_record(row.iter().chain(values.iter().map(String::as_str))).map_err(wrong)?;
         }
         let bytes = writer.into_inner().map_err(|error| Error::file(&self.path, "copy", error.into_error()))?;
         Ok(String::from_utf8_lossy(&bytes).into_owned())
+    }
+}
+
+/// The shortest text that reads back as the same 32-bit float.
+fn number(value: f32) -> String {
+    let text = format!("{value:?}");
+    text.strip_suffix(".0").map_or(text.clone(), str::to_owned)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_back_exactly() {
+        for value in [0.0, -0.0, 1.0, 0.1, 1e-45, f32::MIN_POSITIVE, 16_777_217.0, f32::MAX, 1.0 / 3.0, -2.5e-8] {
+            assert_eq!(number(value).parse().map(f32::to_bits), Ok(value.to_bits()), "{}", number(value));
+        }
+        assert_eq!([0.0, 1.0, 0.5].map(number), ["0", "1", "0.5"]);
     }
 }

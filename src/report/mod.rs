@@ -2,7 +2,9 @@
 
 pub mod evaluate_table;
 mod numerics;
+mod numerics_page;
+mod plots;
 mod stats;
 
-pub use numerics::{NumericsReport, folder};
+pub use numerics::{NumericsFiles, NumericsReport};
 pub use stats::{BuildTimes, DeviceStats, PassStats, Run, Stats};
