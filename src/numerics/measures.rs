@@ -22,6 +22,8 @@ pub enum Measure {
     Ulp(usize),
     /// Of an output, relative to what it should be, or to the floor where that is less.
     Relative(usize, f64),
+    /// The same; bounded is the mean.
+    MeanRelative(usize, f64),
     /// 1 where an output, a decision, is not what it should be. Bounded is the share.
     Wrong(usize),
     /// How far the length of the vector that starts at a column is from 1; a vector of zeros is none.
@@ -45,15 +47,16 @@ impl Measure {
             Self::Absolute(i) => format!("{}, absolute", output(i)),
             Self::Ulp(i) => format!("{}, ULP", output(i)),
             Self::Relative(i, _) => format!("{}, relative", output(i)),
+            Self::MeanRelative(i, _) => format!("{}, relative, mean", output(i)),
             Self::Wrong(i) => format!("{}, share wrong", output(i)),
             Self::Length(i) => format!("length of {}", output(i).trim_end_matches("_x")),
             Self::Other { name, .. } => (*name).into(),
         }
     }
 
-    /// Whether the bound is on the share of evaluations, not on the worst.
-    pub fn is_share(&self) -> bool {
-        matches!(self, Self::Wrong(_) | Self::Other { share: true, .. })
+    /// Whether the bound is on the mean, which of decisions is the share of wrong ones, not on the worst.
+    pub fn is_mean(&self) -> bool {
+        matches!(self, Self::Wrong(_) | Self::MeanRelative(..) | Self::Other { share: true, .. })
     }
 
     /// The error of one evaluation, from 0; not a number only where an output is none.
@@ -63,7 +66,9 @@ impl Measure {
         match *self {
             Self::Absolute(i) => (found(i) - expected(i)).abs(),
             Self::Ulp(i) => ulps(case.outputs[i], expected(i)),
-            Self::Relative(i, floor) => (found(i) - expected(i)).abs() / expected(i).abs().max(floor),
+            Self::Relative(i, floor) | Self::MeanRelative(i, floor) => {
+                (found(i) - expected(i)).abs() / expected(i).abs().max(floor)
+            }
             Self::Wrong(i) => f64::from(u8::from(found(i) != expected(i))),
             Self::Length(i) => {
                 let length = (i..i + 3).map(|i| found(i).powi(2)).sum::<f64>().sqrt();

@@ -6,7 +6,7 @@ use glam::{DVec2, DVec3};
 use super::measures::{Case, Measure, ulps};
 use crate::optics::rough::RoughInterface;
 
-use Measure::{Absolute, Length, Other, Relative, Ulp, Wrong};
+use Measure::{Absolute, Length, MeanRelative, Other, Relative, Ulp, Wrong};
 
 /// A part of a function's domain.
 pub struct Region {
@@ -65,7 +65,7 @@ pub static REGIONS: &[Region] = &[
     region("refract", "critical angle within 3 ULP", refract_critical_ulps, REFRACT),
     region("refract", "critical angle 1e-7 to 1e-2 away", refract_critical, REFRACT_CRITICAL),
     region("refract", "any bits: index 1e-6 to 1e6", refract_wild, REFRACT),
-    region("original_fresnel", "in front, indices 1 to 2.42", original_front, &[(Ulp(0), 16.0)]),
+    region("original_fresnel", "in front, indices 1 to 2.42", original_front, &[(Ulp(0), 20.0)]),
     region("original_fresnel", "from behind, at least 1", original_behind, &[(ORIGINAL_FINITE, 0.0)]),
     region("distribution", "alpha 1e-4 to 1", distribution_ordinary, &[(Ulp(0), 10.0)]),
     region("distribution", "any bits: alpha 1e-10 to 1", distribution_wild, &[(Ulp(0), 10.0)]),
@@ -98,12 +98,21 @@ const REFRACT_CRITICAL: &[(Measure, f64)] = &[
     (Length(0), 5e-7),
     (Wrong(3), 0.0),
 ];
-const EVAL: &[(Measure, f64)] = &[(Relative(0, ROUGH_VALUE), 2e-3), (Relative(1, ROUGH_VALUE), 2e-3)];
+/// Directions are rounded to 6e-8, and so is the cosine at a facet. At the facet's critical angle reflectance, transmittance and the
+/// direction of refraction change with the root of the cosine: a step of 6e-8 changes the transmitted cosine by 8e-4 and the
+/// reflectance by 9e-3 at index 2.42. The worst is bounded by that, and the mean by what is left elsewhere.
+const CRITICAL_FACET: f64 = 1e-2;
+const EVAL: &[(Measure, f64)] = &[
+    (Relative(0, ROUGH_VALUE), CRITICAL_FACET),
+    (MeanRelative(0, ROUGH_VALUE), 1e-6),
+    (Relative(1, ROUGH_VALUE), CRITICAL_FACET),
+    (MeanRelative(1, ROUGH_VALUE), 1e-6),
+];
 const SAMPLE: &[(Measure, f64)] = &[
-    (SAMPLED_DIRECTION, 1e-3),
-    (SAMPLED_WEIGHT, 1e-4),
-    (SAMPLED_PDF, 2e-3),
-    (SAMPLED_VALUE, 2e-3),
+    (SAMPLED_DIRECTION, 2e-3),
+    (SAMPLED_WEIGHT, CRITICAL_FACET),
+    (SAMPLED_PDF, CRITICAL_FACET),
+    (SAMPLED_VALUE, CRITICAL_FACET),
     (SAMPLED_OTHERWISE, 1e-5),
     (Length(0), 2e-6),
 ];

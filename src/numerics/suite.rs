@@ -34,8 +34,8 @@ pub struct Finding {
     pub measure: String,
     /// What may come out; infinite: for comparison only.
     pub bound: f64,
-    /// The bound is on the share of evaluations, the mean, not on the worst.
-    pub is_share: bool,
+    /// The bound is on the mean, which of decisions is the share of wrong ones, not on the worst.
+    pub is_mean: bool,
     /// Evaluations.
     pub count: u64,
     /// The worst error; infinite where an output was not a number.
@@ -51,7 +51,7 @@ pub struct Finding {
 impl Finding {
     /// What the bound is held against.
     pub fn found(&self) -> f64 {
-        if self.is_share { self.mean } else { self.worst }
+        if self.is_mean { self.mean } else { self.worst }
     }
 
     /// Whether the bound holds.
@@ -246,7 +246,7 @@ impl Tally {
             region: region.name,
             measure: measure.name(function),
             bound: *bound,
-            is_share: measure.is_share(),
+            is_mean: measure.is_mean(),
             count: self.count,
             worst: sum.worst,
             cause: sum.cause,

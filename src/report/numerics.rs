@@ -264,7 +264,7 @@ impl<'a> RegionJson<'a> {
         let finding = |finding: &'a Finding| FindingJson {
             measure: &finding.measure,
             bound: finding.bound.is_finite().then_some(finding.bound),
-            statistic: if finding.is_share { "share" } else { "worst" },
+            statistic: if finding.is_mean { "mean" } else { "worst" },
             found: finding.found(),
             worst: finding.worst,
             mean: finding.mean,
@@ -307,7 +307,7 @@ mod tests {
             region: "somewhere",
             measure: measure.into(),
             bound,
-            is_share: false,
+            is_mean: false,
             count: 10,
             worst,
             cause: vec![0.1, 1.5],
