@@ -100,32 +100,31 @@ impl RoughInterface {
     }
 
     /// The shares of power that leave the surface, reflected and transmitted, when light comes at `cos_theta_i`, above 0, and
-    /// bounces once: means over `steps` by `steps` visible normals. What is missing from 1 is what a single bounce loses.
-    pub fn albedo(&self, cos_theta_i: f64, steps: u32) -> (f64, f64) {
+    /// bounces once: means over visible normals, `count` points of a lattice, most even for a Fibonacci number. What is missing
+    /// from 1 is what a single bounce loses.
+    pub fn albedo(&self, cos_theta_i: f64, count: u32) -> (f64, f64) {
+        const GOLDEN: f64 = 0.618_033_988_749_894_9;
         let Self { alpha, eta_i, eta_t } = *self;
         let wi = DVec3::new((1.0 - cos_theta_i * cos_theta_i).max(0.0).sqrt(), 0.0, cos_theta_i);
         let (mut reflected, mut transmitted) = (0.0, 0.0);
-        for i in 0..steps {
-            for j in 0..steps {
-                // Facets left and right of the plane of incidence are alike.
-                let u = DVec2::new((f64::from(i) + 0.5) * 0.5, f64::from(j) + 0.5) / f64::from(steps);
-                let wm = sample_visible_normal(wi, alpha, u);
-                let cos_i = wi.dot(wm);
-                let facet = fresnel_dielectric(cos_i, eta_i, eta_t);
-                let mirrored = 2.0 * cos_i * wm - wi;
-                if mirrored.z > 0.0 {
-                    reflected += facet.reflectance * masking_ggx(mirrored.z, sin_squared(mirrored), alpha);
-                }
-                if !facet.total {
-                    let share = (eta_i + eta_t) / (eta_i * cos_i + eta_t * facet.cos_theta_t);
-                    let refracted = -wi + (eta_t - eta_i) / eta_t * (wi - share * wm);
-                    if refracted.z < 0.0 {
-                        transmitted += facet.transmittance * masking_ggx(-refracted.z, sin_squared(refracted), alpha);
-                    }
+        for i in 0..count {
+            // Facets left and right of the plane of incidence are alike: half a turn is enough.
+            let u = DVec2::new(0.5 * (0.5 + f64::from(i) * GOLDEN).fract(), (f64::from(i) + 0.5) / f64::from(count));
+            let wm = sample_visible_normal(wi, alpha, u);
+            let cos_i = wi.dot(wm);
+            let facet = fresnel_dielectric(cos_i, eta_i, eta_t);
+            let mirrored = 2.0 * cos_i * wm - wi;
+            if mirrored.z > 0.0 {
+                reflected += facet.reflectance * masking_ggx(mirrored.z, sin_squared(mirrored), alpha);
+            }
+            if !facet.total {
+                let share = (eta_i + eta_t) / (eta_i * cos_i + eta_t * facet.cos_theta_t);
+                let refracted = -wi + (eta_t - eta_i) / eta_t * (wi - share * wm);
+                if refracted.z < 0.0 {
+                    transmitted += facet.transmittance * masking_ggx(-refracted.z, sin_squared(refracted), alpha);
                 }
             }
         }
-        let count = f64::from(steps * steps);
-        (reflected / count, transmitted / count)
+        (reflected / f64::from(count), transmitted / f64::from(count))
     }
 }
