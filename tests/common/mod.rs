@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test program uses its share")]
 
 pub mod reference;
+pub mod tables;
 
 use std::io::Write;
 use std::sync::Arc;
