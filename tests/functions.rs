@@ -1,141 +1,102 @@
-//! The shaders' optics functions on the device against their 64-bit counterparts, at the inputs where they break.
+//! The shaders' optics functions on the device: the bounds of `vitrum numerics`, and a table from elsewhere.
 
 mod common;
 
-use std::sync::Arc;
-
 use common::Validated;
-use vitrum::gpu::{
-    Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Format, Gpu, ImageDesc, SamplePush,
-    Specialization, Use, shaders,
-};
-use vitrum::optics::original;
+use common::tables::ExactFresnel;
+use vitrum::numerics::{Function, Probe, suite, ulps};
 
-/// The probe's four outputs for each (cosine, index, roughness).
-fn probe(gpu: &Gpu, inputs: &[[f32; 3]]) -> vitrum::gpu::Result<Vec<[f32; 4]>> {
-    let mut commands = Commands::new(gpu)?;
-    let padded: Vec<[f32; 4]> = inputs.iter().map(|&[a, b, c]| [a, b, c, 0.0]).collect();
-    let size = 16 * inputs.len() as u64;
-    let output = Arc::new(Buffer::new(gpu, &BufferDesc { name: "outputs", size, usage: BufferUse::Storage })?);
-    let readback = Buffer::new(gpu, &BufferDesc { name: "readback", size, usage: BufferUse::Readback })?;
-    // The functions share a file with others that see the scene.
-    let mut bindings = Vec::new();
-    for _ in 0..7 {
-        bindings.push(Bind::Buffer(Arc::new(commands.upload_buffer("unused", &[0.0_f32; 64])?)));
-    }
-    let uses = &[Use::CopyTarget, Use::Sampled];
-    let desc = ImageDesc { name: "unused", width: 1, height: 1, format: Format::Rgba32Float, uses };
-    let image = Arc::new(commands.upload_image(&desc, &[0; 16])?);
-    bindings.push(Bind::Sampled(image.clone()));
-    bindings.push(Bind::Buffer(Arc::new(commands.upload_buffer("inputs", &padded)?)));
-    bindings.push(Bind::Buffer(output.clone()));
-    let group = BindGroup::new(gpu, "probe", bindings)?;
-    let push = SamplePush::default();
-    let shader = &shaders::PROBE_ORIGINAL_COMP;
-    let pipeline =
-        ComputePipeline::new(gpu, shader, &group, size_of::<SamplePush>() as u32, &Specialization::default())?;
-    commands.run(|cmd| {
-        cmd.use_image(&image, Use::Sampled);
-        cmd.dispatch(&pipeline, &group, &push, [inputs.len().div_ceil(64) as u32, 1, 1]);
-        cmd.wait_for_buffers();
-        cmd.copy_buffer(&output, &readback);
-    })?;
-    Ok(bytemuck::allocation::pod_collect_to_vec(readback.bytes()))
+/// Evaluations of each region: `vitrum numerics` tries more.
+const COUNT: u64 = 20_000;
+
+fn probe(validated: &Validated, name: &str) -> Probe {
+    Probe::new(&validated.gpu, Function::named(name).expect("a function")).expect("a probe")
 }
 
-fn evaluate(inputs: &[[f32; 3]]) -> Option<Vec<[f32; 4]>> {
-    let validated = Validated::open()?;
-    let outputs = probe(&validated.gpu, inputs).expect("the probe runs");
+#[test]
+fn every_function_keeps_its_bounds_in_every_region() {
+    let Some(validated) = Validated::open() else { return };
+    let reports = suite::run(&validated.gpu, None, COUNT, 7, &mut |_| {}).expect("the suite runs");
+    assert_eq!(reports.len(), suite::regions(None));
+    let mut broken = Vec::new();
+    for report in &reports {
+        let place = format!("{}, {}", report.function, report.region);
+        if report.non_finite > 0 {
+            broken.push(format!("{place}: {} not finite, {:?}", report.non_finite, report.non_finite_cause));
+        }
+        for finding in &report.findings {
+            let (measure, found, bound) = (&finding.measure, finding.found(), finding.bound);
+            println!("{place}: {measure} {found:.2e} of {bound:.0e}");
+            if !finding.holds() {
+                broken.push(format!("{place}: {measure} {found:.2e} of {bound:.0e}, {:?}", finding.cause));
+            }
+        }
+    }
     validated.verdict();
-    Some(outputs)
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
 
-/// Cosines from grazing to normal.
-fn cosines() -> impl Iterator<Item = f32> {
-    let grazing = (0..=60).map(|i| 10_f32.powf(-f32::from(i as u8) / 6.0));
-    grazing.chain((0..1000).map(|i| (i as f32 + 0.5) / 1000.0))
-}
-
+/// Rows whose inputs are exact in 32 bits, some of them within 3 ULP of the critical angle.
 #[test]
-fn reflectance_holds_at_grazing_angles_and_close_to_index_one() {
-    let indices = [1.0, 1.0 + f32::EPSILON, 1.000001, 1.00001, 1.0003, 1.01, 1.33, 1.5, 2.0, 2.42, 100.0, 1e6];
-    let inputs: Vec<_> = indices.iter().flat_map(|&index| cosines().map(move |cosine| [cosine, index, 0.0])).collect();
-    let Some(outputs) = evaluate(&inputs) else { return };
-    let mut worst = (0.0, [0.0; 3]);
-    for (input, output) in inputs.iter().zip(outputs) {
-        let [cosine, index, _] = input.map(f64::from);
-        let expected = original::fresnel_bsdf(cosine, 1.0, index);
-        let found = f64::from(output[0]);
-        if index == 1.0 {
-            assert_eq!(found, 0.0, "{input:?}");
-            continue;
+fn fresnels_equations_are_those_of_a_table_with_fifty_digits() {
+    let Some(validated) = Validated::open() else { return };
+    let rows: Vec<_> = ExactFresnel::all().into_iter().filter(|row| row.kind.starts_with("f32")).collect();
+    assert!(rows.len() > 300);
+    let inputs: Vec<f32> = rows.iter().flat_map(|row| [row.cos_i as f32, row.eta as f32]).collect();
+    assert!(
+        rows.iter().zip(inputs.chunks(2)).all(|(row, x)| row.cos_i == f64::from(x[0]) && row.eta == f64::from(x[1]))
+    );
+    let outputs = probe(&validated, "fresnel").evaluate(&inputs).expect("the probe runs");
+    let passed = probe(&validated, "fresnel_transmittance").evaluate(&inputs).expect("the probe runs");
+    validated.verdict();
+
+    let mut worst = [0.0_f64; 4];
+    for (row, (found, &transmittance)) in rows.iter().zip(outputs.chunks(3).zip(&passed)) {
+        let errors = [
+            (f64::from(found[0]) - row.reflectance).abs(),
+            ulps(found[0], row.reflectance),
+            ulps(found[1], row.cos_t),
+            ulps(transmittance, row.transmittance),
+        ];
+        for (error, (bound, worst)) in errors.into_iter().zip([2e-6, 4.0, 4.0, 10.0].into_iter().zip(&mut worst)) {
+            assert!(error <= bound, "{row:?}: {found:?}, {transmittance}; errors {errors:?}");
+            *worst = worst.max(error);
         }
-        let error = (found / expected - 1.0).abs();
-        assert!(error < 1e-5, "{input:?}: {found}, expected {expected}");
-        if error > worst.0 {
-            worst = (error, *input);
-        }
-        let cosine = original::get_cos_theta_tr(cosine, 1.0, index);
-        assert!((f64::from(output[1]) - cosine).abs() < 1e-6, "{input:?}: {}, expected {cosine}", output[1]);
+        assert_eq!(found[2] == 1.0, row.is_total(), "{row:?}: {found:?}");
     }
-    println!("reflectance: worst relative error {:.1e} at {:?}", worst.0, worst.1);
+    let [absolute, reflectance, cosine, transmittance] = worst;
+    println!("{} rows: reflectance within {absolute:.1e}, {reflectance:.2} ULP", rows.len());
+    println!("transmitted cosine within {cosine:.2} ULP, transmittance {transmittance:.2} ULP");
 }
 
+/// Between equal indices there is no interface, at whatever angle, where textbooks see total reflection.
 #[test]
-fn from_behind_reflectance_is_the_reports_and_finite() {
-    let brewster = [1.0003_f32, 1.33, 1.5, 2.42].map(|index| [-(1.0 / (1.0 + index * index)).sqrt(), index, 0.0]);
-    let grid = [1.0003, 1.33, 1.5, 2.42].into_iter().flat_map(|index| cosines().map(move |c| [-c, index, 0.0]));
-    let inputs: Vec<_> = brewster.into_iter().chain(grid).collect();
-    let Some(outputs) = evaluate(&inputs) else { return };
-    for (input, output) in inputs.iter().zip(outputs) {
-        let [cosine, index, _] = input.map(f64::from);
-        let expected = original::fresnel_bsdf(cosine, 1.0, index);
-        let found = f64::from(output[0]);
-        assert!(found.is_finite() && found >= 1.0 - 1e-6, "{input:?}: {found}");
-        // A ratio of amplitudes known to 1e-6 next to the angle where it is 0.
-        if expected < 1e4 {
-            assert!((found / expected - 1.0).abs() < 1e-3, "{input:?}: {found}, expected {expected}");
-        }
-    }
-}
+fn at_index_one_nothing_happens() {
+    let Some(validated) = Validated::open() else { return };
+    // Every power of 2, down to the least denormal number, and what lies between.
+    let exponents = (0..=149).map(|i| 2_f64.powi(-i) as f32);
+    let cosines: Vec<f32> = exponents.chain((0..1000).map(|i| (i as f32 + 0.5) / 1000.0)).collect();
+    let both_sides = || cosines.iter().flat_map(|&cosine| [cosine, -cosine]);
 
-#[test]
-fn below_index_one_light_is_totally_reflected_beyond_the_critical_angle() {
-    let indices = [1e-6, 0.4132, 0.5, 0.75, 0.9997];
-    let inputs: Vec<_> = indices.iter().flat_map(|&index| cosines().map(move |cosine| [cosine, index, 0.0])).collect();
-    let Some(outputs) = evaluate(&inputs) else { return };
-    for (input, output) in inputs.iter().zip(outputs) {
-        let [cosine, index, _] = input.map(f64::from);
-        let found = f64::from(output[0]);
-        assert!((0.0..=1.0 + 1e-6).contains(&found), "{input:?}: {found}");
-        let critical = (1.0 - index * index).sqrt();
-        if (cosine - critical).abs() > 1e-4 * critical {
-            let expected = original::fresnel_bsdf(cosine, 1.0, index);
-            assert!((found - expected).abs() < 2e-3, "{input:?}: {found}, expected {expected}");
-        }
+    let inputs: Vec<f32> = both_sides().flat_map(|cosine| [cosine, 1.0]).collect();
+    let outputs = probe(&validated, "fresnel").evaluate(&inputs).expect("the probe runs");
+    for (x, found) in inputs.chunks(2).zip(outputs.chunks(3)) {
+        assert_eq!((found[0], found[2]), (0.0, 0.0), "cosine {:e}: {found:?}", x[0]);
+        // Devices may take denormal numbers for 0.
+        let is_flushed = x[0].abs() < f32::MIN_POSITIVE && found[1] == 0.0;
+        assert!(found[1] == x[0].abs() || is_flushed, "cosine {:e}: {found:?}", x[0]);
     }
-}
 
-#[test]
-fn the_highlight_is_finite_and_right_from_smooth_to_rough() {
-    let roughnesses = [0.0, 0.003, 0.01, 0.03, 0.1, 0.5, 1.0];
-    let inputs: Vec<_> = roughnesses.iter().flat_map(|&r| cosines().map(move |cosine| [cosine, 1.5, r])).collect();
-    let Some(outputs) = evaluate(&inputs) else { return };
-    for (input, output) in inputs.iter().zip(outputs) {
-        let [cosine, _, roughness] = input.map(f64::from);
-        let alpha = roughness * roughness;
-        let [_, _, distribution, masking] = output.map(f64::from);
-        assert!(distribution.is_finite() && masking.is_finite() && distribution >= 0.0, "{input:?}: {output:?}");
-        if roughness == 0.0 {
-            assert_eq!(distribution, 0.0, "{input:?}");
-            continue;
-        }
-        let expected = original::distribution_ggx(cosine, alpha);
-        // The sine that the probe derives from a 32-bit cosine is off by 3e-4 at most.
-        if alpha > 0.1 {
-            assert!((distribution / expected - 1.0).abs() < 1e-4, "{input:?}: {distribution}, expected {expected}");
-        }
-        let expected = original::masking_ggx(cosine, alpha) / (2.0 * cosine);
-        assert!((masking / expected - 1.0).abs() < 1e-5, "{input:?}: {masking}, expected {expected}");
+    let turned = both_sides().zip(0..).flat_map(|(cosine, i)| {
+        let (sine, turn) = ((1.0 - f64::from(cosine).powi(2)).sqrt(), f64::from(i));
+        [(sine * turn.cos()) as f32, (sine * turn.sin()) as f32, cosine, 1.0]
+    });
+    // Devices may flush denormal numbers here as well.
+    let inputs: Vec<f32> = turned.map(|x| if x.abs() < f32::MIN_POSITIVE { 0.0 } else { x }).collect();
+    let outputs = probe(&validated, "refract").evaluate(&inputs).expect("the probe runs");
+    for (x, found) in inputs.chunks(4).zip(outputs.chunks(4)) {
+        assert_eq!(found, [-x[0], -x[1], -x[2], 0.0], "{x:?}");
     }
+    validated.verdict();
+    println!("{} cosines from {:e}", 2 * cosines.len(), f32::from_bits(1));
 }
