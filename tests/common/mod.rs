@@ -4,6 +4,7 @@
 
 pub mod pictures;
 pub mod reference;
+pub mod tables;
 
 use std::io::Write;
 use std::sync::Arc;
