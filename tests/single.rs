@@ -9,9 +9,8 @@ use glam::{DVec2, DVec3};
 use common::Validated;
 use common::pictures::{BALL, largest_difference, picture, scene, sized};
 use common::reference::{Hit, Reference};
-use vitrum::options::{Aov, RenderArgs, Size, Tonemap};
-use vitrum::passes::{Rendered, pixel_offsets, render};
-use vitrum::plan::Plan;
+use vitrum::options::{Aov, RenderArgs, Tonemap};
+use vitrum::passes::{Rendered, pixel_offsets};
 use vitrum::scene::{Dielectric, Overrides, PointLight, Scene, Surface, Surroundings};
 
 /// How far from its true place, in pixels, the rasteriser may put an edge; 0 without a device.

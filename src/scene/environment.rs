@@ -107,7 +107,7 @@ impl Panorama {
         let columns = shares(self.width, width, |edge| edge);
         // A row between v and v + dv covers cos(pi v) - cos(pi (v + dv)).
         let rows = shares(self.height, height, |edge| -(edge * std::f64::consts::PI).cos());
-        let mean = |(row, column): (&Vec<(u32, f64)>, &Vec<(u32, f64)>)| {
+        let mean = |row: &[(u32, f64)], column: &[(u32, f64)]| {
             let mut sum = [0.0; 3];
             for &(y, across) in row {
                 for &(x, along) in column {
@@ -117,7 +117,7 @@ impl Panorama {
             }
             sum.map(|value| value as f32)
         };
-        let texels = rows.iter().flat_map(|row| columns.iter().map(move |column| mean((row, column)))).collect();
+        let texels = rows.iter().flat_map(|row| columns.iter().map(move |column| mean(row, column))).collect();
         Self { width, height, texels, repaired: Repairs::default() }
     }
 }
