@@ -42,11 +42,14 @@ void Open(uint i, uint inputCount, uint outputCount)
     nextOutput = i * outputCount;
 }
 
+// By its bits: a device may take a number below the least normal one for 0, and 0 has no side.
+bool IsNegative(float side) { return floatBitsToUint(side) > 0x80000000u; }
+
 // Indices on the side that light is seen from and beyond: `eta` is the index on the side of -z over that on the side of +z.
-vec2 Indices(float side, float eta) { return side < 0.0 ? vec2(eta, 1.0) : vec2(1.0, eta); }
+vec2 Indices(float side, float eta) { return IsNegative(side) ? vec2(eta, 1.0) : vec2(1.0, eta); }
 
 // The functions take the side of light as +z.
-vec3 Upright(vec3 w, float side) { return side < 0.0 ? vec3(w.xy, -w.z) : w; }
+vec3 Upright(vec3 w, float side) { return IsNegative(side) ? vec3(w.xy, -w.z) : w; }
 
 void main()
 {
