@@ -116,11 +116,13 @@ RoughSurface RoughSurfaceSeenFrom(SurfaceData data, vec3 viewDir)
     RoughSurface surface;
     surface.toWorld = BasisAround(data.behind ? -data.normal : data.normal);
     surface.wi = viewDir * surface.toWorld;
-    // At rims interpolated normals turn away before the surface does.
+    // Where interpolated normals turn to the other side than the surface, as at rims, the view grazes it.
     surface.wi.z = max(surface.wi.z, 1e-4);
     surface.wi = normalize(surface.wi);
     surface.alpha = data.roughness * data.roughness;
-    surface.scale = ENERGY_COMPENSATION ? RoughCompensation(data.albedoTable, surface.wi.z) : 1.0;
+    // From behind facets mirror everything; what a mirror loses is in no table.
+    bool compensated = ENERGY_COMPENSATION && !data.behind;
+    surface.scale = compensated ? RoughCompensation(data.albedoTable, surface.wi.z) : 1.0;
     return surface;
 }
 
@@ -163,18 +165,20 @@ vec3 ComputeRoughLight(SurfaceData data, vec3 viewDir, uvec2 shift, uint first, 
             light += weight * data.refractionIntensity * (radiance + vec3(0.0, data.refractionGreen, 0.0));
         }
     }
-    // A mirror's loss is in no table; it is what its own weights say.
-    float scale = data.behind ? (ENERGY_COMPENSATION ? float(count) / max(weights, 1e-6) : 1.0) : surface.scale;
-    return light * scale / float(count);
+    // What a mirror loses is what its weights lack.
+    if (data.behind && ENERGY_COMPENSATION) return light / max(weights, 1e-6);
+    return light * surface.scale / float(count);
 }
 
-// Light of a point light, mirrored by facets or refracted through them, per unit of irradiance on a plane that faces it.
+// Light of a point light, mirrored by facets or refracted through them, per unit of irradiance on a plane that faces it. None
+// from behind, as with smooth surfaces.
 vec3 ComputeRoughDirect(SurfaceData data, vec3 viewDir, vec3 lightDir)
 {
+    if (data.behind) return vec3(0.0);
     RoughSurface surface = RoughSurfaceSeenFrom(data, viewDir);
     vec3 wo = lightDir * surface.toWorld;
     bool reflected = wo.z > 0.0;
-    if (reflected ? !REFLECTION : !TRANSMISSION || data.behind) return vec3(0.0);
+    if (reflected ? !REFLECTION : !TRANSMISSION) return vec3(0.0);
     float eta = data.refractionIndex;
     float value = EvaluateRough(surface.wi, wo, surface.alpha, 1.0, eta).value;
     if (reflected) return vec3(value * surface.scale * data.reflectionIntensity);

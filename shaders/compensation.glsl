@@ -23,7 +23,8 @@ float RoughAlbedo(uint table, float cosThetaI)
     return mix(albedos[table + low], albedos[table + low + 1], share);
 }
 
-// The factor that gives back what is lost; a table holds nothing below the share that a direction along the surface sees.
+// The factor that gives back what is lost. Along a very rough surface close to index 1 nearly everything is, and a number above 0 is
+// divided by.
 float RoughCompensation(uint table, float cosThetaI)
 {
     return 1.0 / max(RoughAlbedo(table, cosThetaI), 1e-6);

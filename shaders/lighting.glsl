@@ -16,8 +16,11 @@ vec3 ComputeBSDFLight(SurfaceData data, vec3 viewDir)
 vec3 ComputeRoughBSDFLight(SurfaceData data, vec3 viewDir, uvec2 pixel)
 {
     uint first = sampleIndex * frame.normals;
-    uint inAll = frame.normalsInAll != 0 ? frame.normalsInAll : first + frame.normals;
-    uvec2 shift = Pcg3d(uvec3(pixel, frame.seed)).xy;
+    bool known = frame.normalsInAll != 0;
+    uint inAll = known ? frame.normalsInAll : first + frame.normals;
+    // Samples without end lie in the pixel by the sequence that normals follow too: a shift of its own for each sample keeps the two
+    // apart.
+    uvec2 shift = Pcg3d(uvec3(pixel, frame.seed + (known ? 0 : sampleIndex))).xy;
     return ComputeRoughLight(data, viewDir, shift, first, frame.normals, float(inAll));
 }
 

@@ -31,12 +31,14 @@ float MaskingGGX(float cosTheta, float sinThetaSquared, float alpha)
 vec3 SampleVisibleNormal(vec3 wi, float alpha, vec2 u)
 {
     vec3 stretched = normalize(vec3(alpha * wi.xy, wi.z));
-    // A point of the cap, 1 - u.y (1 + z) below the pole: written with the distance from the pole, whose digits the sine needs.
-    float below = u.y * (1.0 + stretched.z);
+    // The last of the 32-bit numbers below 1 keeps the vector off zero.
+    float v = min(u.y, LAST_BELOW_ONE);
+    // A point of the cap, v (1 + z) below the pole: written with that distance, whose digits the sine needs.
+    float below = v * (1.0 + stretched.z);
     float sine = sqrt(max(below * (2.0 - below), 0.0));
     vec2 halfway = sine * CosSinTurns(u.x) + stretched.xy;
-    // 1 - below + z, without the cancellation; the last of the 32-bit numbers below 1 keeps the vector off zero.
-    float height = (1.0 - min(u.y, 0.99999994)) * (1.0 + stretched.z);
+    // 1 - below + z, without the cancellation.
+    float height = (1.0 - v) * (1.0 + stretched.z);
     return normalize(vec3(alpha * halfway, height));
 }
 

@@ -3,9 +3,13 @@
 #ifndef OFFSET_GLSL
 #define OFFSET_GLSL
 
-// The next float above, or below, in the direction of `sign`. Zero becomes the smallest number that no device takes for zero.
+#include "constants.glsl"
+
+// The next float above, or below, in the direction of `sign`; the largest stays. Zero becomes the smallest number that no device
+// takes for zero.
 float NextFloat(float x, float sign)
 {
+    if (!(abs(x) < LARGEST_FLOAT)) return x < 0.0 ? -LARGEST_FLOAT : LARGEST_FLOAT;
     if (abs(x) < 1.1754944e-38) return sign > 0.0 ? 1.1754944e-38 : -1.1754944e-38;
     uint bits = floatBitsToUint(x);
     return uintBitsToFloat((x > 0.0) == (sign > 0.0) ? bits + 1u : bits - 1u);
@@ -14,7 +18,7 @@ float NextFloat(float x, float sign)
 // A point on the side of `w` of every plane with the normal `n` through the box `position` +- `error`.
 vec3 OffsetRayOrigin(vec3 position, vec3 error, vec3 n, vec3 w)
 {
-    float distance = dot(abs(n), error);
+    float distance = min(dot(abs(n), error), LARGEST_FLOAT);
     vec3 offset = (dot(w, n) < 0.0 ? -distance : distance) * n;
     vec3 origin = position + offset;
     for (int i = 0; i < 3; ++i) {

@@ -21,6 +21,8 @@ const uint TRANSMITTANCE = 8;
 const uint DISPERSED_INDEX = 9;
 const uint OFFSET_ORIGIN = 10;
 const uint FRESNEL_TRANSMITTANCE = 11;
+const uint REFRACT_ABOUT = 12;
+const uint BASIS = 13;
 
 layout(local_size_x = 64) in;
 layout(std430, set = 0, binding = 0) readonly buffer InputBuffer { float inputs[]; };
@@ -80,6 +82,21 @@ void main()
         Refraction refraction = Refract(Upright(wi, wi.z), vec3(0.0, 0.0, 1.0), eta.x, eta.y);
         Put(Upright(refraction.wt, wi.z));
         Put(refraction.crossed.total ? 1.0 : 0.0);
+        break;
+    }
+    case REFRACT_ABOUT: {
+        Open(i, 7, 4);
+        vec3 wi = Take3();
+        vec3 n = Take3();
+        Refraction refraction = Refract(wi, n, 1.0, Take());
+        Put(refraction.wt);
+        Put(refraction.crossed.total ? 1.0 : 0.0);
+        break;
+    }
+    case BASIS: {
+        Open(i, 3, 9);
+        mat3 axes = BasisAround(Take3());
+        for (int k = 0; k < 3; ++k) Put(axes[k]);
         break;
     }
     case ROUGH_EVAL: {

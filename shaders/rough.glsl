@@ -40,8 +40,8 @@ vec3 Combined(float a, vec3 x, float b, vec3 y)
     return sum;
 }
 
-// The density of a direction whose facet reflects, or refracts, the given share of light: visible normals, equation 37, times the
-// solid angle of facets over that of directions, equations 14 and 17. `denominator` is that of equation 17, etaI cosI - etaT
+// The density of a direction whose facet reflects, or refracts, the given share of light: visible normals (Heitz 2018) times
+// the solid angle of facets over that of directions (Walter 2007, equations 14 and 17). `denominator` is that of equation 17, etaI cosI - etaT
 // cosT, as its callers can tell it without cancellation; cosT is not used by reflection.
 float FacetDensity(vec3 wi, vec3 wm, float alpha, bool reflected, float share, float cosI, float cosT, float etaT, float denominator)
 {

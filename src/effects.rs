@@ -47,6 +47,8 @@ struct Row {
     effect: Effect,
     name: &'static str,
     models: &'static [Model],
+    /// Without this it changes nothing, and is not simulated.
+    needs: Option<Effect>,
     called_for: fn(&Scene) -> bool,
 }
 
@@ -55,7 +57,8 @@ const TABLE: [Row; 13] = {
     use Effect::*;
     use Model::Single;
     const fn row(effect: Effect, name: &'static str, models: &'static [Model], called_for: fn(&Scene) -> bool) -> Row {
-        Row { effect, name, models, called_for }
+        let needs = if matches!(effect, EnergyCompensation) { Some(Roughness) } else { None };
+        Row { effect, name, models, needs, called_for }
     }
     [
         row(Reflection, "reflection", &[Single], |s| any_dielectric(s, |_| true)),
@@ -192,8 +195,13 @@ impl Default for Selection {
 }
 
 impl Selection {
-    /// The effects that this selects for `scene`.
+    /// The effects that this selects for `scene`; one that needs another which is not selected is not.
     pub fn resolve(&self, scene: &Scene) -> Effects {
+        let selected = self.selected(scene);
+        selected.iter().filter(|effect| effect.row().needs.is_none_or(|needed| selected.contains(needed))).collect()
+    }
+
+    fn selected(&self, scene: &Scene) -> Effects {
         Effect::all()
             .filter(|&effect| {
                 // Later terms win; a selection that only takes away starts from what the scene calls for.
@@ -280,6 +288,8 @@ mod tests {
         assert_eq!(selected("auto,-nesting"), auto[..3]);
         assert_eq!(selected("-nesting"), auto[..3]);
         assert_eq!(selected("all,-opaque,opaque").len(), TABLE.len());
+        assert_eq!(selected("energy-compensation,reflection"), ["reflection"]);
+        assert_eq!(selected("energy-compensation,roughness"), ["roughness", "energy-compensation"]);
         assert!("auto,magic".parse::<Selection>().is_err());
         assert_eq!("all,-nesting".parse::<Selection>().map(|s| s.to_string()), Ok("all,-nesting".into()));
     }

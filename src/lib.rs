@@ -9,7 +9,7 @@
 //! [`scene`] is plain data without a Vulkan type, [`effects`] the table of what can be simulated, [`plan`] what one
 //! render does, [`gpu`] the only room with `unsafe`, [`passes`] the frame, [`image`] pixels and their files,
 //! [`report`] what is told about a render, [`commands`] what the binary offers. [`optics`] states in 64-bit
-//! arithmetic what `shaders/` computes in 32.
+//! arithmetic what `shaders/` computes in 32, and [`numerics`] holds one against the other on a device.
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
@@ -23,6 +23,7 @@ pub mod image;
 pub mod numerics;
 pub mod optics;
 pub mod options;
+mod parallel;
 pub mod passes;
 pub mod plan;
 pub mod report;

@@ -104,6 +104,32 @@ fn white_surroundings_stay_white() {
     }
 }
 
+/// The halves of an image, packed below it, are white where the image is, whatever its size.
+#[test]
+fn white_images_of_any_size_stay_white() {
+    for (width, height) in [(1, 1), (2, 2), (13, 7), (1, 64), (64, 1), (7, 301), (301, 7), (1000, 499)] {
+        let mut scene = ball(0.5, 1.5);
+        let texels = vec![[1.0; 3]; (width * height) as usize];
+        scene.environment.light = Surroundings::Image(Panorama::new(width, height, texels));
+        let Some((_, image)) = picture(&scene, sized(48, 48)) else { return };
+        let Some((_, color)) = picture(&white(scene), sized(48, 48)) else { return };
+        let difference = largest_difference(&image, &color);
+        assert!(difference < 1e-5, "{width}x{height}: {difference}");
+    }
+}
+
+/// Without a number of samples that is known, cones shrink as they come.
+#[test]
+fn a_time_budget_stays_white_too() {
+    let scene = white(ball(0.5, 1.5));
+    let args = RenderArgs { time_budget: Some(60.0), samples: Some(20), ..sized(48, 48) };
+    let Some((plan, rendered)) = picture(&scene, args) else { return };
+    assert!(matches!(plan.budget, vitrum::plan::Budget::Seconds { .. }));
+    let pixels = by_cosine(&scene, &rendered, 48);
+    let mean = mean(pixels.iter().map(|&(value, _)| value));
+    assert!((mean - 1.0).abs() < 2e-3, "{mean}");
+}
+
 /// What a single bounce loses is what the 64-bit albedo says it is.
 #[test]
 fn without_compensation_the_loss_shows() {
@@ -234,6 +260,11 @@ fn from_inside_rough_glass_is_a_blurred_mirror() {
     let Some((_, rendered)) = picture(&scene, sized(64, 64)) else { return };
     let worst = rendered.radiance.iter().flatten().map(|value| (value - 1.0).abs()).fold(0.0, f32::max);
     assert!(worst < 1e-5, "{worst}");
+    // A light in there shows no more than on the smooth surface: nothing.
+    scene.environment.light = Surroundings::Color(DVec3::ZERO);
+    scene.lights = vec![PointLight { position: DVec3::new(0.4, 0.3, 0.0), intensity: DVec3::ONE }];
+    let Some((_, rendered)) = picture(&scene, sized(64, 64)) else { return };
+    assert!(rendered.radiance.iter().flatten().all(|&value| value == 0.0));
 }
 
 /// With more samples cones shrink: a bright spot is less and less averaged, and the picture tends to that of many.
@@ -259,18 +290,21 @@ fn more_samples_converge() {
 /// A scene without rough materials has nothing of what they need: no tables, no averages of its environment.
 #[test]
 fn smooth_scenes_pay_nothing() {
-    let peak = |roughness: f64| {
+    let peak = |roughness: f64, list: &str| {
         let scene = ball(roughness, 1.5);
         let validated = common::Validated::open()?;
-        let plan = vitrum::plan::Plan::new(&scene, &sized(16, 16)).expect("a plan");
+        let args = RenderArgs { effects: Some(list.parse().expect("a selection")), ..sized(16, 16) };
+        let plan = vitrum::plan::Plan::new(&scene, &args).expect("a plan");
         vitrum::passes::render(&validated.gpu, &scene, &plan, &mut |_| {}).expect("a picture");
         let bytes = validated.gpu.peak_bytes();
         validated.verdict();
         Some(bytes)
     };
-    let (Some(smooth), Some(rough)) = (peak(0.01), peak(0.5)) else { return };
+    let (Some(smooth), Some(rough)) = (peak(0.01, "auto"), peak(0.5, "auto")) else { return };
     println!("{smooth} bytes smooth, {rough} rough");
     assert!(smooth < rough);
+    assert_eq!(Some(smooth), peak(0.01, "all"));
+    assert_eq!(Some(smooth), peak(0.5, "auto,-roughness"));
     let mut mixed = ball(0.01, 1.5);
     mixed.materials.push(vitrum::scene::Material {
         name: "worn by nothing".into(),

@@ -8,9 +8,9 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{Talk, devices, print};
 use crate::gpu::{Gpu, Instance};
 use crate::image::OutputFile;
-use crate::numerics::{FUNCTIONS, Function, suite};
+use crate::numerics::{FUNCTIONS, Function, Table, suite};
 use crate::options::range;
-use crate::report::{NumericsFiles, NumericsReport, evaluate_table};
+use crate::report::{NumericsFiles, NumericsReport};
 use crate::{Error, Result};
 
 /// Inputs in each region: 10^8 and more in all.
@@ -76,12 +76,17 @@ impl NumericsCommand {
                     let message = "is read by this run and would be replaced; name another file";
                     return Err(Error::input(output.path(), 0, message));
                 }
-                let table = evaluate_table::Table::read(function, inputs)?;
+                let table = Table::read(function, inputs)?;
                 let (instance, gpu) = open()?;
                 for (given, name) in [(self.count, "--count"), (self.seed, "--seed")] {
                     if given.is_some() {
                         talk.note(&format!("note: {name} changes nothing: --inputs says what is evaluated"));
                     }
+                }
+                for name in table.shadowed() {
+                    talk.note(&format!(
+                        "note: column {name:?} is passed through; the device's follows it under the same name"
+                    ));
                 }
                 talk.detail(&format!("device: {} ({})", gpu.info().name, gpu.info().driver));
                 let text = table.evaluate(&gpu)?;
@@ -92,6 +97,11 @@ impl NumericsCommand {
                 (instance.messages(), Ok(()))
             }
             _ => {
+                let is_table = |path: &PathBuf| path.extension().is_some_and(|extension| extension == "csv");
+                if let Some(path) = self.output.as_ref().filter(|path| is_table(path)) {
+                    let message = "is to be a folder for reports; name one, or add --inputs for a CSV file";
+                    return Err(Error::input(path, 0, message));
+                }
                 self.output.as_deref().map(NumericsFiles::check).transpose()?;
                 let (instance, gpu) = open()?;
                 let files = self.output.as_deref().map(NumericsFiles::new).transpose()?;
@@ -109,13 +119,14 @@ impl NumericsCommand {
                 (instance.messages(), report.verdict())
             }
         };
-        match messages.all().as_slice() {
-            [] => verdict.map_err(Error::Check),
-            [first, ..] => Err(Error::Check(format!(
-                "the validation layer has {} messages, the first: {}",
-                messages.count(),
-                first.lines().next().unwrap_or_default()
-            ))),
+        let said = messages.all().first().map(|first| {
+            let first = first.lines().next().unwrap_or_default();
+            format!("the validation layer has {} messages, the first: {first}", messages.count())
+        });
+        match (verdict, said) {
+            (Ok(()), None) => Ok(()),
+            (Err(broken), Some(said)) => Err(Error::Check(format!("{broken}; and {said}"))),
+            (Err(failed), None) | (Ok(()), Some(failed)) => Err(Error::Check(failed)),
         }
     }
 

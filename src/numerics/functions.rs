@@ -27,7 +27,7 @@ pub struct Function {
 }
 
 /// Every function, by its number.
-pub static FUNCTIONS: [Function; 12] = [
+pub static FUNCTIONS: [Function; 14] = [
     Function {
         name: "fresnel",
         id: 0,
@@ -145,6 +145,32 @@ pub static FUNCTIONS: [Function; 12] = [
         inputs: &["cos_i", "eta"],
         outputs: &["transmittance"],
         reference: |x| vec![interface(x[0], x[1]).transmittance],
+    },
+    Function {
+        name: "refract_about",
+        id: 12,
+        about: "the refracted direction about any normal n, on the side of wi, where the index is 1",
+        inputs: &["wi_x", "wi_y", "wi_z", "n_x", "n_y", "n_z", "eta"],
+        outputs: &["wt_x", "wt_y", "wt_z", "total"],
+        reference: |x| {
+            let wt = refract(vector(&x[..3]), vector(&x[3..6]), 1.0, x[6]);
+            let total = f64::from(u8::from(wt.is_none()));
+            let wt = wt.unwrap_or(DVec3::ZERO);
+            vec![wt.x, wt.y, wt.z, total]
+        },
+    },
+    Function {
+        name: "basis",
+        id: 13,
+        about: "axes of a local frame about the normal n",
+        inputs: &["n_x", "n_y", "n_z"],
+        outputs: &["x_x", "x_y", "x_z", "y_x", "y_y", "y_z", "z_x", "z_y", "z_z"],
+        // Any right-handed frame about n will do.
+        reference: |x| {
+            let n = vector(x).normalize();
+            let (across, along) = n.any_orthonormal_pair();
+            [across, along, n].iter().flat_map(|axis| axis.to_array()).collect()
+        },
     },
 ];
 

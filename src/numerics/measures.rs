@@ -32,8 +32,8 @@ pub enum Measure {
     Other {
         /// Its name.
         name: &'static str,
-        /// Whether the bound is on the share of evaluations, not on the worst.
-        share: bool,
+        /// Whether the bound is on the mean, not on the worst.
+        on_mean: bool,
         /// The error.
         error: fn(&Case) -> f64,
     },
@@ -56,7 +56,7 @@ impl Measure {
 
     /// Whether the bound is on the mean, which of decisions is the share of wrong ones, not on the worst.
     pub fn is_mean(&self) -> bool {
-        matches!(self, Self::Wrong(_) | Self::MeanRelative(..) | Self::Other { share: true, .. })
+        matches!(self, Self::Wrong(_) | Self::MeanRelative(..) | Self::Other { on_mean: true, .. })
     }
 
     /// The error of one evaluation, from 0; not a number only where an output is none.

@@ -11,7 +11,7 @@ use crate::gpu::{
 const FUNCTION: u32 = 128;
 
 /// Inputs of one dispatch: few enough for every device, many enough to keep it busy.
-pub const CHUNK: usize = 1 << 17;
+pub(super) const CHUNK: usize = 1 << 17;
 
 /// One function, ready to be evaluated.
 pub struct Probe {

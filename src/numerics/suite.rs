@@ -1,17 +1,13 @@
 //! Every region of every function: what is the worst, where, and is it within bounds?
 
-use std::iter;
-use std::num::NonZero;
-use std::panic::resume_unwind;
-use std::sync::{Mutex, PoisonError};
-use std::thread::{self, ScopedJoinHandle};
-
 use fastrand::Rng;
 
 use super::measures::Case;
+use super::probe::CHUNK;
 use super::regions::REGIONS;
 use super::{Function, Measure, Probe, Region};
 use crate::gpu::{Gpu, Result};
+use crate::parallel;
 
 /// Errors are kept by the angle of incidence, one bin a degree.
 pub const ANGLES: usize = 90;
@@ -19,9 +15,6 @@ pub const ANGLES: usize = 90;
 /// Evaluations that one thread generates or compares at a time. Each batch has a seed and a tally of its own, and tallies are merged
 /// in order: results do not depend on how many threads there are.
 const BATCH: usize = 1 << 13;
-
-/// Evaluations between two dispatches.
-const ROUND: usize = 1 << 17;
 
 /// What one measure came to in one region.
 #[derive(Clone, Debug)]
@@ -106,12 +99,12 @@ pub fn run(
 
 fn try_region(gpu: &Gpu, function: &'static Function, region: &Region, count: u64, seed: u64) -> Result<RegionReport> {
     let mut probe = Probe::new(gpu, function)?;
-    let threads = thread::available_parallelism().map_or(1, NonZero::get);
+    let threads = parallel::threads();
     let mut seeds = Rng::with_seed(seed);
     let mut all = Tally::new(region);
     let mut done = 0;
     while done < count {
-        let now = (count - done).min(ROUND as u64) as usize;
+        let now = (count - done).min(CHUNK as u64) as usize;
         let inputs = generate(function, region, now, &mut seeds, threads);
         let outputs = probe.evaluate(&inputs)?;
         all.merge(compare(function, region, &inputs, &outputs, threads));
@@ -124,7 +117,7 @@ fn generate(function: &Function, region: &Region, count: usize, seeds: &mut Rng,
     let columns = function.inputs.len();
     let mut inputs = vec![0.0; count * columns];
     let batches: Vec<_> = inputs.chunks_mut(BATCH * columns).map(|batch| (batch, seeds.u64(..))).collect();
-    in_parallel(threads, batches, |(batch, seed)| {
+    parallel::map(threads, batches, |(batch, seed)| {
         let mut rng = Rng::with_seed(seed);
         batch.chunks_mut(columns).for_each(|row| (region.generate)(&mut rng, row));
     });
@@ -135,24 +128,10 @@ fn compare(function: &Function, region: &Region, inputs: &[f32], outputs: &[f32]
     let (columns, results) = (function.inputs.len(), function.outputs.len());
     let batches = inputs.chunks(BATCH * columns).zip(outputs.chunks(BATCH * results)).collect();
     let mut all = Tally::new(region);
-    for part in in_parallel(threads, batches, |(inputs, outputs)| tally(function, region, inputs, outputs)) {
+    for part in parallel::map(threads, batches, |(inputs, outputs)| tally(function, region, inputs, outputs)) {
         all.merge(part);
     }
     all
-}
-
-/// What `work` makes of each item, in the order of the items. Each thread takes the next one that is left.
-fn in_parallel<I: Send, T: Send>(threads: usize, items: Vec<I>, work: impl Fn(I) -> T + Sync) -> Vec<T> {
-    let left = Mutex::new(items.into_iter().enumerate());
-    let next = || left.lock().unwrap_or_else(PoisonError::into_inner).next();
-    let worker = || iter::from_fn(next).map(|(i, item)| (i, work(item))).collect::<Vec<_>>();
-    let mut results = thread::scope(|scope| {
-        let workers: Vec<_> = (0..threads).map(|_| scope.spawn(worker)).collect();
-        let join = |worker: ScopedJoinHandle<'_, _>| worker.join().unwrap_or_else(|panic| resume_unwind(panic));
-        workers.into_iter().flat_map(join).collect::<Vec<_>>()
-    });
-    results.sort_by_key(|&(i, _)| i);
-    results.into_iter().map(|(_, result)| result).collect()
 }
 
 fn tally(function: &Function, region: &Region, inputs: &[f32], outputs: &[f32]) -> Tally {
@@ -271,7 +250,7 @@ mod tests {
     #[test]
     fn items_keep_their_order() {
         for threads in [1, 3, 8] {
-            assert_eq!(in_parallel(threads, (0..100).collect(), |i| 2 * i), (0..200).step_by(2).collect::<Vec<_>>());
+            assert_eq!(parallel::map(threads, (0..100).collect(), |i| 2 * i), (0..200).step_by(2).collect::<Vec<_>>());
         }
     }
 
@@ -294,6 +273,11 @@ mod tests {
         assert!(texts[0] == texts[1] && texts[0] == texts[2]);
         let worst: Vec<_> = reports[0].findings[..3].iter().map(|finding| finding.worst).collect();
         assert!(worst[0] > 0.4 && worst[0] <= 0.5 && worst[2] <= 0.5, "{worst:?}");
+    }
+
+    #[test]
+    fn every_region_is_one_of_a_function() {
+        assert!(REGIONS.iter().all(|region| Function::named(region.function).is_ok()));
     }
 
     #[test]

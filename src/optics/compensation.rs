@@ -4,16 +4,14 @@
 //! "Practical multiple scattering compensation for microfacet models" (2019), scales the BSDF by 1 / E, E being the share that
 //! leaves the surface after one bounce when light comes at the given angle: surroundings of radiance 1 then show radiance 1.
 
-use std::num::NonZero;
-use std::thread;
-
 use super::rough::RoughInterface;
+use crate::parallel;
 
 /// E by the cosine of incidence, for one interface and side: nodes at cosines (i / (NODES - 1))^3, dense where light grazes the
 /// surface and most is lost.
 #[derive(Clone, Debug)]
 pub struct AlbedoTable {
-    nodes: [f64; NODES],
+    nodes: Vec<f64>,
 }
 
 /// Nodes of a table.
@@ -36,35 +34,21 @@ fn node(i: usize) -> f64 {
 impl AlbedoTable {
     /// The table of `interface`, as light is seen from its `eta_i` side.
     pub fn new(interface: RoughInterface) -> Self {
-        let mut nodes = [0.0; NODES];
-        // Nodes next to the surface take longest: threads take turns.
-        let threads = thread::available_parallelism().map_or(1, NonZero::get).min(NODES);
-        let share = |first: usize| {
-            (first..NODES).step_by(threads).map(|i| {
-                let cosine = node(i).max(LEAST_COSINE);
-                let normals = if cosine < GRAZING { NORMALS_GRAZING } else { NORMALS };
-                let (reflected, transmitted) = interface.albedo(cosine, normals);
-                (i, reflected + transmitted)
-            })
-        };
-        thread::scope(|scope| {
-            let handles: Vec<_> =
-                (0..threads).map(|first| scope.spawn(move || share(first).collect::<Vec<_>>())).collect();
-            for handle in handles {
-                let found = handle.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-                found.into_iter().for_each(|(i, albedo)| nodes[i] = albedo);
-            }
+        let nodes = parallel::map(parallel::threads(), (0..NODES).collect(), |i| {
+            let cosine = node(i).max(LEAST_COSINE);
+            let normals = if cosine < GRAZING { NORMALS_GRAZING } else { NORMALS };
+            let (reflected, transmitted) = interface.albedo(cosine, normals);
+            reflected + transmitted
         });
         Self { nodes }
     }
 
     /// E at the nodes, in the order of the cosines.
-    pub fn nodes(&self) -> &[f64; NODES] {
+    pub fn nodes(&self) -> &[f64] {
         &self.nodes
     }
 
-    /// E at a cosine, linear in it between nodes: next to the surface E goes to 0 as the cosine does. As
-    /// `shaders/compensation.glsl`.
+    /// E at a cosine, linear in it between nodes: close to index 1 E goes to 0 with the cosine. As `shaders/compensation.glsl`.
     pub fn albedo(&self, cos_theta_i: f64) -> f64 {
         let cosine = cos_theta_i.clamp(0.0, 1.0);
         let low = ((cosine.cbrt() * (NODES - 1) as f64) as usize).min(NODES - 2);

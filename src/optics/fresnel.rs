@@ -72,16 +72,16 @@ pub fn refract(wi: DVec3, n: DVec3, eta_i: f64, eta_t: f64) -> Option<DVec3> {
     (!crossed.total).then(|| -(eta_i / eta_t) * (wi - cosine * n) - crossed.cos_theta_t * n)
 }
 
-/// What a 32-bit cosine does to the result: the factor by which a relative error of `cos_theta_i` grows in the transmitted
-/// cosine. Infinite at the critical angle.
-pub fn condition_of_cos_theta_t(cos_theta_i: f64, eta_i: f64, eta_t: f64) -> f64 {
-    let crossed = fresnel_dielectric(cos_theta_i, eta_i, eta_t);
-    (eta_i * cos_theta_i / (eta_t * crossed.cos_theta_t)).powi(2)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// What a 32-bit cosine does to the result: the factor by which a relative error of `cos_theta_i` grows in the transmitted
+    /// cosine. Infinite at the critical angle.
+    fn condition_of_cos_theta_t(cos_theta_i: f64, eta_i: f64, eta_t: f64) -> f64 {
+        let crossed = fresnel_dielectric(cos_theta_i, eta_i, eta_t);
+        (eta_i * cos_theta_i / (eta_t * crossed.cos_theta_t)).powi(2)
+    }
 
     #[test]
     fn textbook_values() {

@@ -17,6 +17,9 @@ pub fn masking_ggx(cos_theta: f64, sin_theta_squared: f64, alpha: f64) -> f64 {
     2.0 * cos_theta / (cos_theta + (cos_theta * cos_theta + alpha * alpha * sin_theta_squared).sqrt())
 }
 
+/// The last of the 32-bit numbers below 1: `u` stays below 1, where facets end.
+pub const LAST_BELOW_ONE: f64 = 1.0 - f64::EPSILON * (1_u64 << 28) as f64;
+
 /// The square of the sine of the angle between `w` and +z.
 pub fn sin_squared(w: DVec3) -> f64 {
     w.x * w.x + w.y * w.y
@@ -26,14 +29,15 @@ pub fn sin_squared(w: DVec3) -> f64 {
 /// (HPG 2023), listing 3. `u` from 0 to 1.
 pub fn sample_visible_normal(wi: DVec3, alpha: f64, u: DVec2) -> DVec3 {
     let stretched = DVec3::new(alpha * wi.x, alpha * wi.y, wi.z).normalize();
-    let below = u.y * (1.0 + stretched.z);
+    let v = u.y.min(LAST_BELOW_ONE);
+    let below = v * (1.0 + stretched.z);
     let sine = (below * (2.0 - below)).max(0.0).sqrt();
     let halfway = sine * DVec2::from_angle(TAU * u.x) + stretched.truncate();
-    let height = (1.0 - u.y.min(0.999_999_94)) * (1.0 + stretched.z);
+    let height = (1.0 - v) * (1.0 + stretched.z);
     (alpha * halfway).extend(height).normalize()
 }
 
-/// Density of [`sample_visible_normal`] per steradian, equation 37's visible normals as Heitz 2018 writes them.
+/// Density of [`sample_visible_normal`] per steradian: E. Heitz, "Sampling the GGX Distribution of Visible Normals" (JCGT 2018).
 pub fn visible_normal_density(wi: DVec3, wm: DVec3, alpha: f64) -> f64 {
     let masking = masking_ggx(wi.z, sin_squared(wi), alpha);
     masking * wi.dot(wm).max(0.0) * distribution_ggx(wm.z, sin_squared(wm), alpha) / wi.z
@@ -68,6 +72,14 @@ mod tests {
                 assert!((area - 1.0).abs() < 1e-3, "alpha {alpha}: {area}");
                 assert!((seen - 1.0).abs() < 2e-3, "alpha {alpha}, {degrees} degrees: {seen}");
             }
+        }
+    }
+
+    #[test]
+    fn the_last_facets_are_nearly_upright() {
+        assert_eq!(LAST_BELOW_ONE, f64::from(1.0_f32.next_down()));
+        for u in [LAST_BELOW_ONE, 1.0] {
+            assert!(sample_visible_normal(DVec3::Z, 0.5, DVec2::new(0.3, u)).z < 1e-3);
         }
     }
 

@@ -3,7 +3,7 @@
 
 use glam::{DVec2, DVec3};
 
-use super::fresnel::{fresnel_dielectric, fresnel_transmittance, refract};
+use super::fresnel::{fresnel_dielectric, fresnel_transmittance};
 use super::microfacet::{masking_ggx, sample_visible_normal, sin_squared, visible_normal_density};
 
 /// Below this alpha, and between equal indices, an interface is smooth.
@@ -81,9 +81,11 @@ impl RoughInterface {
         let wm = if self.is_spread() { sample_visible_normal(wi, alpha, DVec2::new(u.x, u.y)) } else { DVec3::Z };
         let cos_i = wi.dot(wm);
         let facet = fresnel_dielectric(cos_i, eta_i, eta_t);
-        let refracted = refract(wi, wm, eta_i, eta_t).filter(|_| u.z >= facet.reflectance);
-        let reflected = refracted.is_none();
-        let wo = refracted.unwrap_or(2.0 * cos_i * wm - wi);
+        let reflected = facet.total || u.z < facet.reflectance;
+        let wo = match reflected {
+            true => 2.0 * cos_i * wm - wi,
+            false => self.refract_through_facet(wi, wm, cos_i, facet.cos_theta_t),
+        };
         if !self.is_spread() {
             let pdf = if reflected { facet.reflectance } else { facet.transmittance };
             return RoughSample { wo, weight: self.radiance(reflected), pdf };
@@ -93,6 +95,12 @@ impl RoughInterface {
         }
         let pdf = self.evaluate(wi, wo).pdf;
         RoughSample { wo, weight: masking_ggx(wo.z.abs(), sin_squared(wo), alpha) * self.radiance(reflected), pdf }
+    }
+
+    /// The direction beyond a facet. As a change of the direction seen: no terms cancel close to index 1.
+    fn refract_through_facet(&self, wi: DVec3, wm: DVec3, cos_i: f64, cos_theta_t: f64) -> DVec3 {
+        let share = (self.eta_i + self.eta_t) / (self.eta_i * cos_i + self.eta_t * cos_theta_t);
+        -wi + (self.eta_t - self.eta_i) / self.eta_t * (wi - share * wm)
     }
 
     fn radiance(&self, reflected: bool) -> f64 {
@@ -118,8 +126,7 @@ impl RoughInterface {
                 reflected += facet.reflectance * masking_ggx(mirrored.z, sin_squared(mirrored), alpha);
             }
             if !facet.total {
-                let share = (eta_i + eta_t) / (eta_i * cos_i + eta_t * facet.cos_theta_t);
-                let refracted = -wi + (eta_t - eta_i) / eta_t * (wi - share * wm);
+                let refracted = self.refract_through_facet(wi, wm, cos_i, facet.cos_theta_t);
                 if refracted.z < 0.0 {
                     transmitted += facet.transmittance * masking_ggx(-refracted.z, sin_squared(refracted), alpha);
                 }

@@ -40,7 +40,7 @@ impl Resources {
             Surroundings::Image(panorama) => (panorama, true),
             Surroundings::Color(_) => (&single, false),
         };
-        let levels = levels(commands.gpu(), panorama, plan);
+        let levels = levels(commands.gpu(), panorama, scene, plan);
         let environment = upload_panorama(commands, panorama, levels)?;
         let frame = Frame {
             environment_size: [panorama.width, panorama.height],
@@ -155,22 +155,35 @@ struct Place {
     to_mesh: DAffine3,
 }
 
-/// Materials, and the tables of what rough ones lose, for those that objects wear.
+/// Materials, and the tables of what rough ones lose.
 fn materials(scene: &Scene, plan: &Plan) -> (Vec<MaterialRecord>, Vec<f32>) {
+    let mut tables: Vec<(RoughInterface, u32)> = Vec::new();
     let mut albedos = Vec::new();
-    let mut record = |(i, material): (usize, &Material)| {
+    let record = |material: &Material| {
         let Surface::Dielectric(Dielectric { ior, roughness, .. }) = material.surface else {
             return MaterialRecord::default();
         };
-        let albedo_table = albedos.len() as u32;
-        let worn = scene.objects.iter().any(|object| object.material == i);
-        if worn && roughness > SMOOTH && ior != 1.0 && plan.effects.contains(Effect::EnergyCompensation) {
+        let mut albedo_table = 0;
+        if plan.effects.contains(Effect::EnergyCompensation) && is_rough(material) {
             let interface = RoughInterface { alpha: roughness * roughness, eta_i: 1.0, eta_t: ior };
-            albedos.extend(AlbedoTable::new(interface).nodes().map(|albedo| albedo as f32));
+            albedo_table = match tables.iter().find(|(other, _)| *other == interface) {
+                Some(&(_, first)) => first,
+                None => {
+                    let first = albedos.len() as u32;
+                    albedos.extend(AlbedoTable::new(interface).nodes().iter().map(|&albedo| albedo as f32));
+                    tables.push((interface, first));
+                    first
+                }
+            };
         }
         MaterialRecord { refraction_index: ior as f32, roughness: roughness as f32, albedo_table }
     };
-    (scene.materials.iter().enumerate().map(&mut record).collect(), albedos)
+    (scene.materials.iter().map(record).collect(), albedos)
+}
+
+/// Whether light is spread by a surface of that material.
+fn is_rough(material: &Material) -> bool {
+    matches!(material.surface, Surface::Dielectric(Dielectric { ior, roughness, .. }) if roughness > SMOOTH && ior != 1.0)
 }
 
 fn lights(scene: &Scene, view: &View) -> Vec<LightRecord> {
@@ -218,7 +231,7 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
 /// of its own levels would do if drivers fetched each pixel of a quad from the level that it asks for; lavapipe takes one for all.
 fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) -> Result<Image> {
     let is_half = |value: &f32| f16::from_f32(*value).to_f32() == *value;
-    // In half precision where that loses nothing, as with images that came in it.
+    // In half precision where that loses nothing of the image itself, as with images that came in it.
     let half = panorama.texels.iter().flatten().all(is_half);
     let format = if half { Format::Rgba16Float } else { Format::Rgba32Float };
     let width = panorama.width;
@@ -231,20 +244,23 @@ fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) ->
     texels.resize((width * height) as usize, [0.0; 3]);
     let mut level = panorama.halved();
     for i in 1..levels {
+        if i > 1 {
+            level = level.halved();
+        }
         let left = width - (width >> (i - 1));
         for (y, row) in (panorama.height..).zip(level.texels.chunks(level.width as usize)) {
             let start = (y * width + left) as usize;
             texels[start..start + row.len()].copy_from_slice(row);
         }
-        level = level.halved();
     }
     commands.upload_image(&desc, &pack(&texels, half))
 }
 
 /// Levels of the panorama that rough surfaces see averages of; 1 where nothing is rough, or where they would not fit.
-fn levels(gpu: &Gpu, panorama: &Panorama, plan: &Plan) -> u32 {
+fn levels(gpu: &Gpu, panorama: &Panorama, scene: &Scene, plan: &Plan) -> u32 {
     let fits = panorama.height + panorama.height / 2 <= gpu.max_image_side();
-    if plan.effects.contains(Effect::Roughness) && fits { panorama.width.min(panorama.height).ilog2() + 1 } else { 1 }
+    let needed = plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);
+    if needed && fits { panorama.width.min(panorama.height).ilog2() + 1 } else { 1 }
 }
 
 /// Texels as an image holds them.

@@ -1,6 +1,5 @@
-//! What is told about a render.
+//! What is told about a render, and about a device's arithmetic.
 
-pub mod evaluate_table;
 mod numerics;
 mod numerics_page;
 mod plots;

@@ -2,8 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use super::{Function, Probe};
 use crate::gpu::Gpu;
-use crate::numerics::{Function, Probe};
 use crate::{Error, Result};
 
 /// The rows of a file.
@@ -51,9 +51,6 @@ impl Table {
             }
         };
         let columns = function.inputs.iter().map(column).collect::<Result<Vec<_>>>()?;
-        if let Some(name) = function.outputs.iter().find(|name| header.iter().any(|column| column.trim() == **name)) {
-            return Err(Error::input(path, 1, format!("column {name:?} is an output of {}; rename it", function.name)));
-        }
         let (mut rows, mut inputs) = (Vec::new(), Vec::new());
         for row in reader.records() {
             let row = row.map_err(|error| wrong(&error))?;
@@ -68,6 +65,12 @@ impl Table {
             rows.push(row);
         }
         Ok(Self { function, path: path.into(), header, rows, inputs })
+    }
+
+    /// Columns of the file that are called as an output is: they are passed through, and the outputs follow them.
+    pub fn shadowed(&self) -> impl Iterator<Item = &'static str> {
+        let outputs = self.function.outputs.iter().copied();
+        outputs.filter(|name| self.header.iter().any(|column| column.trim() == *name))
     }
 
     /// The file with the outputs of the device beside the columns, as they were given.
