@@ -1,7 +1,7 @@
 //! What the original model costs: `cargo bench --bench single` prints the README's table.
 //!
-//! The built-in scene, the same with rough glass, and the same view without objects, the floor, take turns in one process; medians of the rounds,
-//! device times, pipelines warm. Then whole runs of the program: from its start to the finished file.
+//! The built-in scene, the same with rough glass, and the same view without objects, the floor, take turns in one process;
+//! medians of the rounds, device times, pipelines warm. Then whole runs of the program: from its start to the finished file.
 
 use std::path::Path;
 use std::process::{Command, Stdio};

@@ -78,11 +78,11 @@ vec3 SampleEnvironment(vec3 direction, float lod)
     return frame.environmentRadiance * radiance;
 }
 
-// The level whose texels are about as wide as a cone of `solidAngle`. Rows have the same height everywhere; towards the poles
+// The level whose texels, with the interpolation between them that doubles their area, are as wide as a cone of `solidAngle`. Rows have the same height everywhere; towards the poles
 // columns get narrower, and there less is averaged than might be.
 float EnvironmentLod(float solidAngle)
 {
-    float rows = sqrt(solidAngle) * float(frame.environmentSize.y) / PI;
+    float rows = sqrt(0.5 * solidAngle) * float(frame.environmentSize.y) / PI;
     return clamp(log2(max(rows, 1e-3)), 0.0, float(frame.environmentLevels - 1));
 }
 

@@ -64,10 +64,10 @@ impl Budget {
 const MOST_SAMPLES: u32 = 1 << 20;
 
 /// Visible normals that all samples of a pixel should take of a rough surface.
-const NORMALS: u32 = 64;
+const NORMALS: u32 = 256;
 
 /// Visible normals that one sample takes, at least and at most.
-const NORMALS_A_SAMPLE: RangeInclusive<u32> = 4..=16;
+const NORMALS_A_SAMPLE: RangeInclusive<u32> = 8..=16;
 
 impl Plan {
     /// Visible normals of a rough surface that each sample of a pixel takes.

@@ -46,8 +46,8 @@ pub(super) struct NumericsCommand {
     device: Option<String>,
 
     /// Run under the validation layer; any message makes the run fail with 1
-    #[arg(long)]
-    validation: bool,
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    validation: Option<bool>,
 }
 
 impl NumericsCommand {
@@ -65,7 +65,7 @@ impl NumericsCommand {
             return Err(Error::Usage(message));
         }
         let open = || -> Result<_> {
-            let instance = Instance::new(self.validation)?;
+            let instance = Instance::new(self.validation == Some(true))?;
             let gpu = Gpu::open(&instance, instance.choose(self.device.as_deref())?)?;
             Ok((instance, gpu))
         };
@@ -91,7 +91,15 @@ impl NumericsCommand {
                 talk.detail(&format!("device: {} ({})", gpu.info().name, gpu.info().driver));
                 let text = table.evaluate(&gpu)?;
                 match &output {
-                    Some(output) => output.write(text.as_bytes())?,
+                    Some(output) => {
+                        output.write(text.as_bytes())?;
+                        talk.note(&format!(
+                            "{}: {} at {} inputs",
+                            output.path().display(),
+                            function.name,
+                            table.rows()
+                        ));
+                    }
                     None => print(&text)?,
                 }
                 (instance.messages(), Ok(()))
@@ -112,9 +120,12 @@ impl NumericsCommand {
                 let regions = suite::run(&gpu, only, count, seed, &mut |done| bar.set_position(done))?;
                 bar.finish_and_clear();
                 let report = NumericsReport::new(gpu.info(), seed, regions);
-                print(&report.table(talk.verbose > 0))?;
-                if let Some(files) = files {
+                if !talk.quiet {
+                    print(&report.table(talk.verbose > 0))?;
+                }
+                if let (Some(files), Some(folder)) = (files, &self.output) {
                     report.write(&files)?;
+                    talk.note(&format!("{}: the report", folder.join("index.html").display()));
                 }
                 (instance.messages(), report.verdict())
             }

@@ -80,6 +80,11 @@ impl RenderCommand {
         plan.budget = plan.budget.less(start.elapsed());
         let rendered = passes::render(&gpu, &scene, &plan, &mut |done| bar.set_position(done.into()))?;
         bar.finish_and_clear();
+        if let Some(budget) = plan.options.time_budget.filter(|&budget| start.elapsed().as_secs_f64() > 1.05 * budget) {
+            let (taken, samples) = (start.elapsed().as_secs_f64(), rendered.samples);
+            let what = if samples == 1 { "set-up and one sample, the least," } else { "it" };
+            talk.note(&format!("note: --time-budget {budget} s: {what} took {taken:.2} s"));
+        }
 
         let metadata = metadata(&device, &scene, &plan, rendered.samples);
         let bytes = match format {

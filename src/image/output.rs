@@ -26,6 +26,8 @@ impl ImageFormat {
     }
 }
 
+const NOT_A_FILE: &str = "is a device, pipe or socket, which cannot be replaced; name a file";
+
 /// A file that can be written: its folder exists and takes files, and nothing but a file is in its place.
 #[derive(Clone, Debug)]
 pub struct OutputFile {
@@ -40,17 +42,18 @@ impl OutputFile {
         if path.file_name().is_none() {
             return Err(Error::input(path, 0, "names no file; add a file name"));
         }
+        // Links such as /dev/stdout lead to files that are not ours to replace.
+        let whole = std::path::absolute(path).map_err(|source| Error::file(path, "write", source))?;
+        if whole.starts_with("/dev") || whole.starts_with("/proc") {
+            return Err(Error::input(path, 0, NOT_A_FILE));
+        }
         let target = behind_links(path).map_err(|source| Error::file(path, "write", source))?;
         match fs::metadata(&target) {
             Ok(metadata) if metadata.is_dir() => {
                 return Err(Error::input(path, 0, "is a folder; add a file name"));
             }
             Ok(metadata) if !metadata.is_file() => {
-                return Err(Error::input(
-                    path,
-                    0,
-                    "is a device, pipe or socket, which cannot be replaced; name a file",
-                ));
+                return Err(Error::input(path, 0, NOT_A_FILE));
             }
             Ok(_) => {}
             Err(error) if error.kind() == io::ErrorKind::NotFound => {}

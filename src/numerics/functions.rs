@@ -189,7 +189,10 @@ impl Function {
             let (ok, wanted) = match name {
                 "cos_i" => ((-1.0..=1.0).contains(&value), "a cosine from -1 to 1"),
                 "eta" | "ior" => ((1e-6..=1e6).contains(&value), "an index from 1e-6 to 1e6"),
-                "alpha" => ((0.0..=1.0).contains(&value), "an alpha from 0 to 1"),
+                "alpha" if self.name.starts_with("rough") => ((0.0..=1.0).contains(&value), "an alpha from 0 to 1"),
+                "alpha" => ((1e-10..=1.0).contains(&value), "an alpha from 1e-10 to 1"),
+                "wi_z" if self.name == "visible_normal" => (value > 0.0, "a direction with z above 0"),
+                "w_z" | "wm_z" => (value >= 0.0, "a direction with z from 0"),
                 "u1" | "u2" | "u3" => ((0.0..=1.0).contains(&value), "a number from 0 to 1"),
                 "absorption" | "distance" => (value >= 0.0 && value.is_finite(), "a finite number from 0"),
                 "wavelength" => ((1.0..=1e6).contains(&value), "a wavelength in nanometres from 1 to 1e6"),
@@ -207,8 +210,13 @@ impl Function {
             let length = vector.iter().map(|x| f64::from(*x).powi(2)).sum::<f64>().sqrt();
             // Three digits a component are enough to be taken for one.
             if (length - 1.0).abs() > 1e-3 {
-                return Err(format!("{direction} has length {length}: expected a direction of length 1"));
+                return Err(format!(
+                    "{direction} has length {length:.4}: expected a direction of length 1, within 0.001"
+                ));
             }
+        }
+        if self.name == "refract_about" && (0..3).map(|i| inputs[i] * inputs[i + 3]).sum::<f32>() < 0.0 {
+            return Err("wi lies behind the surface: expected it on the side of n".into());
         }
         Ok(())
     }
@@ -265,5 +273,14 @@ mod tests {
         let error = refract.check(&[0.5, 0.5, 0.5, 1.5]).expect_err("not a direction");
         assert!(error.starts_with("wi has length 0.866"), "{error}");
         assert!(Function::named("magic").is_err());
+        let check = |name, inputs: &[f32]| Function::named(name).expect("a function").check(inputs);
+        assert!(
+            check("visible_normal", &[0.0, 0.0, -1.0, 0.5, 0.5, 0.5])
+                .is_err_and(|error| error.starts_with("wi_z -1.0"))
+        );
+        assert!(check("masking", &[0.0, 0.0, -1.0, 0.5]).is_err());
+        assert!(check("distribution", &[0.0, 0.0, 1.0, 1e-19]).is_err());
+        assert!(check("refract_about", &[0.6, 0.0, -0.8, 0.0, 0.0, 1.0, 1.5]).is_err());
+        assert!(check("rough_eval", &[0.6, 0.0, -0.8, 0.0, 0.0, 1.0, 0.0, 1.5]).is_ok());
     }
 }

@@ -45,7 +45,9 @@ impl Table {
                 (Some((place, _)), None) => Ok(place),
                 (None, _) => {
                     let wanted = function.inputs.join(",");
-                    Err(Error::input(path, 1, format!("no column {name:?}; {} needs {wanted}", function.name)))
+                    let one = header.len() == 1 && header[0].contains([';', '\t']);
+                    let hint = if one { ", separated by commas" } else { "" };
+                    Err(Error::input(path, 1, format!("no column {name:?}; {} needs {wanted}{hint}", function.name)))
                 }
                 _ => Err(Error::input(path, 1, format!("column {name:?} is there twice; leave one"))),
             }
@@ -65,6 +67,11 @@ impl Table {
             rows.push(row);
         }
         Ok(Self { function, path: path.into(), header, rows, inputs })
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> usize {
+        self.rows.len()
     }
 
     /// Columns of the file that are called as an output is: they are passed through, and the outputs follow them.

@@ -120,15 +120,18 @@ impl RoughInterface {
             let u = DVec2::new(0.5 * (0.5 + f64::from(i) * GOLDEN).fract(), (f64::from(i) + 0.5) / f64::from(count));
             let wm = sample_visible_normal(wi, alpha, u);
             let cos_i = wi.dot(wm);
-            let facet = fresnel_dielectric(cos_i, eta_i, eta_t);
+            // A mean does not need the digits that `fresnel_dielectric` keeps at a price.
+            let squared = (eta_t - eta_i) * (eta_t + eta_i) + (eta_i * cos_i).powi(2);
+            let cos_t = squared.max(0.0).sqrt() / eta_t;
+            let through = if cos_t > 0.0 { fresnel_transmittance(cos_i, cos_t, eta_i, eta_t) } else { 0.0 };
             let mirrored = 2.0 * cos_i * wm - wi;
             if mirrored.z > 0.0 {
-                reflected += facet.reflectance * masking_ggx(mirrored.z, sin_squared(mirrored), alpha);
+                reflected += (1.0 - through) * masking_ggx(mirrored.z, sin_squared(mirrored), alpha);
             }
-            if !facet.total {
-                let refracted = self.refract_through_facet(wi, wm, cos_i, facet.cos_theta_t);
+            if through > 0.0 {
+                let refracted = self.refract_through_facet(wi, wm, cos_i, cos_t);
                 if refracted.z < 0.0 {
-                    transmitted += facet.transmittance * masking_ggx(-refracted.z, sin_squared(refracted), alpha);
+                    transmitted += through * masking_ggx(-refracted.z, sin_squared(refracted), alpha);
                 }
             }
         }

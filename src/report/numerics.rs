@@ -162,8 +162,15 @@ impl NumericsReport {
         let NumericsFiles { json, plots, page } = files;
         json.write(self.json().as_bytes())?;
         let svg = plots::svg(&self.regions).map_err(|source| Error::file(plots.path(), "draw", source))?;
-        if let Some(svg) = &svg {
-            plots.write(svg.as_bytes())?;
+        match &svg {
+            Some(svg) => plots.write(svg.as_bytes())?,
+            // Those of a report before are not of this one.
+            None => match std::fs::remove_file(plots.path()) {
+                Err(error) if error.kind() != std::io::ErrorKind::NotFound => {
+                    return Err(Error::file(plots.path(), "remove", error));
+                }
+                _ => {}
+            },
         }
         page.write(numerics_page::html(self, svg.as_deref()).as_bytes())
     }
