@@ -42,9 +42,10 @@ impl OutputFile {
         if path.file_name().is_none() {
             return Err(Error::input(path, 0, "names no file; add a file name"));
         }
-        // Links such as /dev/stdout lead to files that are not ours to replace.
+        // Links such as /dev/stdout lead to files that are not ours to replace; /dev/shm is a folder as any other.
         let whole = std::path::absolute(path).map_err(|source| Error::file(path, "write", source))?;
-        if whole.starts_with("/dev") || whole.starts_with("/proc") {
+        let is_device = whole.parent() == Some(Path::new("/dev"));
+        if is_device || whole.starts_with("/dev/fd") || whole.starts_with("/proc") {
             return Err(Error::input(path, 0, NOT_A_FILE));
         }
         let target = behind_links(path).map_err(|source| Error::file(path, "write", source))?;
@@ -151,6 +152,15 @@ mod tests {
             fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name().into_string().unwrap()).collect();
         names.sort();
         names
+    }
+
+    #[cfg(unix)]
+    #[test]
+    fn what_stdout_leads_to_is_not_replaced() {
+        for path in ["/dev/stdout", "/dev/fd/1", "/proc/self/fd/1", "/dev/null"] {
+            let error = OutputFile::new(Path::new(path)).unwrap_err();
+            assert!(error.to_string().contains("cannot be replaced"), "{error}");
+        }
     }
 
     #[test]
