@@ -98,9 +98,9 @@ const REFRACT_ABOUT: &[(Measure, f64)] =
     &[(Absolute(0), 5e-7), (Absolute(1), 5e-7), (Absolute(2), 5e-7), (Length(0), 5e-7), (Wrong(3), 0.0)];
 const BASIS: &[(Measure, f64)] = &[(BASIS_SKEW, 5e-7), (Length(0), 5e-7), (Length(3), 5e-7), (Length(6), 5e-7)];
 const SAMPLE_SMOOTH: &[(Measure, f64)] = &[
-    (Absolute(0), 3e-7),
-    (Absolute(1), 3e-7),
-    (Absolute(2), 3e-7),
+    (Absolute(0), 5e-7),
+    (Absolute(1), 5e-7),
+    (Absolute(2), 5e-7),
     (Relative(3, 1.0), 1e-6),
     (Relative(4, 1.0), 1e-6),
 ];
