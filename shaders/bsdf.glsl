@@ -141,6 +141,7 @@ vec3 ComputeRoughLight(SurfaceData data, vec3 viewDir, uvec2 shift, uint first, 
     float weights = 0.0;
     for (uint k = 0; k < count; ++k) {
         vec3 wm = SampleVisibleNormal(wi, surface.alpha, PlasticPoint(first + k, shift));
+        float dither = UnitFloat((first + k) * GOLDEN_STEP + shift.x);
         float cosI = dot(wi, wm);
         Interface facet = FresnelDielectric(cosI, 1.0, eta);
         float reflected = data.behind ? 1.0 : facet.reflectance;
@@ -151,7 +152,7 @@ vec3 ComputeRoughLight(SurfaceData data, vec3 viewDir, uvec2 shift, uint first, 
             weights += weight;
             if (REFLECTION) {
                 float pdf = FacetDensity(wi, wm, surface.alpha, /* reflected */ true, 1.0, cosI, 0.0, eta, 1.0);
-                vec3 radiance = SampleEnvironment(surface.toWorld * wr, EnvironmentLod(1.0 / (inAll * pdf)));
+                vec3 radiance = SampleEnvironment(surface.toWorld * wr, EnvironmentLod(1.0 / (inAll * pdf), dither));
                 light += weight * data.reflectionIntensity * (radiance + vec3(data.reflectionRed, 0.0, 0.0));
             }
         }
@@ -160,7 +161,7 @@ vec3 ComputeRoughLight(SurfaceData data, vec3 viewDir, uvec2 shift, uint first, 
         if (TRANSMISSION && wt.z < 0.0) {
             float denominator = (eta - 1.0) * (eta + 1.0) / (cosI + eta * facet.cosThetaT);
             float pdf = FacetDensity(wi, wm, surface.alpha, /* reflected */ false, 1.0, cosI, facet.cosThetaT, eta, denominator);
-            vec3 radiance = SampleEnvironment(surface.toWorld * wt, EnvironmentLod(1.0 / (inAll * pdf)));
+            vec3 radiance = SampleEnvironment(surface.toWorld * wt, EnvironmentLod(1.0 / (inAll * pdf), dither));
             weight = facet.transmittance * MaskingGGX(-wt.z, SinSquared(wt), surface.alpha);
             light += weight * data.refractionIntensity * (radiance + vec3(0.0, data.refractionGreen, 0.0));
         }

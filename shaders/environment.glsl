@@ -64,26 +64,26 @@ vec3 SampleEnvironmentImage(vec2 uv, Level level)
     return mix(top, bottom, weight.y);
 }
 
-// Radiance arriving from `direction`, of any length above 0. `lod` is the level of the image, from 0; between levels it is
-// interpolated.
+// Radiance arriving from `direction`, of any length above 0. `lod` is the level of the image, a whole number from 0.
 vec3 SampleEnvironment(vec3 direction, float lod)
 {
     if (!ENVIRONMENT_IMAGE) return frame.environmentRadiance;
     float u = Atan2(direction.x, -direction.z) / (2.0 * PI) + frame.environmentTurn;
     float v = Atan2(length(direction.xz), direction.y) / PI;
     vec2 uv = vec2(u - floor(u), v);
-    int level = int(lod);
-    vec3 radiance = SampleEnvironmentImage(uv, EnvironmentLevel(level));
-    if (lod > float(level)) radiance = mix(radiance, SampleEnvironmentImage(uv, EnvironmentLevel(level + 1)), lod - float(level));
+    vec3 radiance = SampleEnvironmentImage(uv, EnvironmentLevel(int(lod)));
     return frame.environmentRadiance * radiance;
 }
 
-// The level whose texels, with the interpolation between them that doubles their area, are as wide as a cone of `solidAngle`. Rows have the same height everywhere; towards the poles
-// columns get narrower, and there less is averaged than might be.
-float EnvironmentLod(float solidAngle)
+// The level whose texels, with the interpolation between them that doubles their area, are as wide as a cone of `solidAngle`. It
+// lies between two levels; `dither`, even from 0 to below 1, chooses one, which in the mean of many look-ups is as good as mixing
+// both, at half the price. Rows have the same height everywhere; towards the poles columns get narrower, and there less is
+// averaged than might be.
+float EnvironmentLod(float solidAngle, float dither)
 {
     float rows = sqrt(0.5 * solidAngle) * float(frame.environmentSize.y) / PI;
-    return clamp(log2(max(rows, 1e-3)), 0.0, float(frame.environmentLevels - 1));
+    float lod = clamp(log2(max(rows, 1e-3)), 0.0, float(frame.environmentLevels - 1));
+    return floor(lod + dither);
 }
 
 #endif

@@ -24,6 +24,9 @@ float UnitFloat(uint bits)
     return float(bits >> 8) * 5.9604645e-8;
 }
 
+// 1 / golden ratio in units of 2^-32: its multiples fill an interval more evenly than those of any other number.
+const uint GOLDEN_STEP = 2654435769u;
+
 // Scrambles three numbers: Jarzynski & Olano, "Hash Functions for GPU Rendering", JCGT 2020.
 uvec3 Pcg3d(uvec3 v)
 {
