@@ -15,4 +15,11 @@ float DispersedIndex(float ior, float dispersion, float wavelength)
     return ior + (ior - 1.0) * (dispersion / 20.0) * (523655.0 / (wavelength * wavelength) - 1.5168);
 }
 
+// The index at `wavelength` in nanometres by Sellmeier's formula; resonances in square micrometres.
+float SellmeierIndex(vec3 strengths, vec3 resonances, float wavelength)
+{
+    float squared = wavelength * wavelength * 1e-6;
+    return sqrt(1.0 + dot(strengths, squared / (squared - resonances)));
+}
+
 #endif

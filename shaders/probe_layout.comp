@@ -37,19 +37,36 @@ void main()
     Put(frame.normalsInAll);
     Put(frame.environmentLevels);
     Put(vec2(frame.environmentSize));
+    Put(frame.maxDepth);
+    Put(frame.tolerance);
+    Put(vec4(frame.cameraBodies));
+    Put(frame.cameraIndex);
+    Put(frame.cameraMedium);
     // The second of two, so that the size of the first counts too.
     Put(instances[1].objectToWorld);
     Put(instances[1].normalToWorld);
-    Put(instances[1].rayOrigin);
-    Put(instances[1].firstTriangle);
     Put(instances[1].worldToObject);
+    Put(instances[1].firstTriangle);
     Put(instances[1].firstVertex);
+    Put(instances[1].firstNode);
     Put(instances[1].material);
     Put(instances[1].smoothNormals);
     Put(instances[1].number);
+    Put(instances[1].rank);
+    Put(instances[1].mesh);
+    Put(materials[1].absorption);
     Put(materials[1].refractionIndex);
+    Put(materials[1].baseColor);
     Put(materials[1].roughness);
+    Put(materials[1].emission);
+    Put(materials[1].metallic);
+    Put(materials[1].sellmeierStrengths);
+    Put(materials[1].dispersion);
+    Put(materials[1].sellmeierResonances);
+    Put(materials[1].specular);
+    Put(materials[1].kind);
     Put(materials[1].albedoTable);
+    Put(materials[1].texture);
     Put(lights[1].position);
     Put(lights[1].intensity);
     Put(positions[1]);
@@ -60,4 +77,7 @@ void main()
     Put(clipOffset);
     Put(instanceIndex);
     Put(sampleIndex);
+    Put(firstRow);
+    Put(wavelengths);
+    for (int i = 0; i < 4; ++i) Put(spectrum[i]);
 }

@@ -22,25 +22,47 @@ struct Frame {
     uint normalsInAll;         // that all samples of a pixel take; 0: not known beforehand
     uint environmentLevels;    // of the environment's image: halves of halves below it
     uvec2 environmentSize;     // of its first level
+    uint maxDepth;             // interfaces in a chain
+    float tolerance;           // throughput that a pixel may lose
+    uvec4 cameraBodies;        // ranks of the bodies that the camera is in, as in media.glsl
+    float cameraIndex;         // of the medium around it
+    uint cameraMedium;         // its material, from 1; 0: none
     uvec2 padding;
 };
 
 struct Instance {
     mat4x3 objectToWorld;
     mat4x3 normalToWorld;      // its last column is unused
-    vec3 rayOrigin;            // the camera in the mesh's space
+    mat4x3 worldToObject;
     uint firstTriangle;
-    mat4x3 worldToObject;      // directions only: its last column is unused
     uint firstVertex;
+    uint firstNode;            // of its mesh's hierarchy
     uint material;
     uint smoothNormals;        // 0: normals of the faces
     uint number;               // of the object in the scene file, from 1
+    uint rank;                 // where bodies overlap the highest one is there; 0: no body
+    uint mesh;
 };
 
+const uint KIND_DIELECTRIC = 0;
+const uint KIND_PANE = 1;      // a thin-walled dielectric
+const uint KIND_OPAQUE = 2;
+
 struct Material {
-    float refractionIndex;
+    vec3 absorption;           // per unit of length
+    float refractionIndex;     // at 587.6 nm
+    vec3 baseColor;
     float roughness;
+    vec3 emission;
+    float metallic;
+    vec3 sellmeierStrengths;
+    float dispersion;          // 20 / Abbe number; below 0: by Sellmeier's formula
+    vec3 sellmeierResonances;  // square micrometres
+    float specular;
+    uint kind;
     uint albedoTable;          // its first node in the tables of compensation.glsl
+    uint texture;              // from 1; 0: none
+    uint padding;
 };
 
 struct Light {
@@ -63,6 +85,9 @@ layout(push_constant) uniform Push {
     vec2 clipOffset;           // the same in clip space
     uint instanceIndex;
     uint sampleIndex;
+    uint firstRow;             // of the rows that are traced
+    uint wavelengths;          // that a sample takes
+    vec4 spectrum[4];          // of each its colour, and nanometres
 };
 
 #endif

@@ -38,7 +38,7 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
     vec3 ray = mat3(instance.worldToObject) * direction;
 
     vec3 p = cross(ray, edge2);
-    vec3 fromCorner = instance.rayOrigin - corner;
+    vec3 fromCorner = instance.worldToObject[3] - corner; // the camera is at the origin
     vec3 q = cross(fromCorner, edge1);
     float determinant = dot(edge1, p);
     float inverse = abs(determinant) > 1e-30 ? 1.0 / determinant : 0.0; // seen exactly on edge

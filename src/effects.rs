@@ -55,25 +55,27 @@ struct Row {
 /// THE table. Detection is conservative: an effect that might show is called for.
 const TABLE: [Row; 13] = {
     use Effect::*;
-    use Model::Single;
+    use Model::{Single, Tree};
+    const TRACED: &[Model] = &[Tree];
+    const BOTH: &[Model] = &[Single, Tree];
     const fn row(effect: Effect, name: &'static str, models: &'static [Model], called_for: fn(&Scene) -> bool) -> Row {
         let needs = if matches!(effect, EnergyCompensation) { Some(Roughness) } else { None };
         Row { effect, name, models, needs, called_for }
     }
     [
-        row(Reflection, "reflection", &[Single], |s| any_dielectric(s, |_| true)),
-        row(Transmission, "transmission", &[Single], |s| any_dielectric(s, |_| true)),
-        row(Interior, "interior", &[], |s| any_dielectric(s, |_| true)),
-        row(DirectLight, "direct-light", &[Single], has_light),
-        row(Shadows, "shadows", &[], has_light),
+        row(Reflection, "reflection", BOTH, |s| any_dielectric(s, |_| true)),
+        row(Transmission, "transmission", BOTH, |s| any_dielectric(s, |_| true)),
+        row(Interior, "interior", TRACED, |s| any_dielectric(s, |_| true)),
+        row(DirectLight, "direct-light", BOTH, has_light),
+        row(Shadows, "shadows", TRACED, has_light),
         row(Roughness, "roughness", &[Single], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
         row(EnergyCompensation, "energy-compensation", &[Single], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
-        row(Absorption, "absorption", &[], |s| any_dielectric(s, absorbs)),
-        row(Dispersion, "dispersion", &[], |s| any_dielectric(s, |d| d.dispersion > 0.0)),
-        row(Nesting, "nesting", &[], nests),
-        row(ThinWalled, "thin-walled", &[], |s| any_dielectric(s, |d| d.thin_walled)),
-        row(Opaque, "opaque", &[], |s| surfaces(s).any(|x| matches!(x, Surface::Opaque(_)))),
-        row(Textures, "textures", &[], |s| {
+        row(Absorption, "absorption", TRACED, |s| any_dielectric(s, absorbs)),
+        row(Dispersion, "dispersion", TRACED, |s| any_dielectric(s, |d| d.dispersion > 0.0)),
+        row(Nesting, "nesting", TRACED, nests),
+        row(ThinWalled, "thin-walled", TRACED, |s| any_dielectric(s, |d| d.thin_walled)),
+        row(Opaque, "opaque", TRACED, |s| surfaces(s).any(|x| matches!(x, Surface::Opaque(_)))),
+        row(Textures, "textures", TRACED, |s| {
             surfaces(s).any(|x| matches!(x, Surface::Opaque(opaque) if opaque.base_color_texture.is_some()))
         }),
     ]

@@ -96,6 +96,11 @@ pub enum Aov {
 }
 
 impl Aov {
+    /// Whether it says what surface lies at the centre of a pixel, and not what a model made of it.
+    pub fn is_of_surfaces(self) -> bool {
+        matches!(self, Self::Normal | Self::Depth | Self::Albedo | Self::Object)
+    }
+
     /// The name of the layer.
     pub fn name(self) -> &'static str {
         match self {
@@ -175,7 +180,7 @@ ranges! {
 /// What is `None` was not given; [`RenderArgs::or`] joins two of them.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct RenderArgs {
-    /// Light transport model; this version has single [default: single]
+    /// Light transport model; this version has single and tree [default: single]
     #[arg(long, value_name = "NAME")]
     pub model: Option<Model>,
 
@@ -187,11 +192,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = range::samples)]
     pub samples: Option<u32>,
 
-    /// Longest chain of interfaces; model single sees one [default: 32]
+    /// Longest chain of interfaces; model single sees one [default: 32; with --tolerance: 1024]
     #[arg(long, value_name = "N", value_parser = range::max_depth)]
     pub max_depth: Option<u32>,
 
-    /// Stop when the estimated relative error of the image is below X; not in model single
+    /// Model tree: cut branches so that no pixel discards more than X of the light [default: 0.01]
     #[arg(long, value_name = "X", value_parser = range::positive)]
     pub tolerance: Option<f64>,
 
@@ -227,7 +232,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME")]
     pub tonemap: Option<Tonemap>,
 
-    /// Extra layers in the EXR; model single has normal, depth and object
+    /// Extra layers in the EXR; model single has normal, depth, object; tree also albedo, interfaces, discarded
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub aov: Option<Vec<Aov>>,
 

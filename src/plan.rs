@@ -4,7 +4,7 @@ use std::ops::RangeInclusive;
 use std::time::Duration;
 
 use crate::effects::{Effect, Effects};
-use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap};
+use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap, Trace};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -17,6 +17,12 @@ pub struct Plan {
     pub size: Size,
     /// Samples per pixel, or as many as the time allows.
     pub budget: Budget,
+    /// Longest chain of interfaces; `None` in models that do not follow one.
+    pub max_depth: Option<u32>,
+    /// Throughput that a pixel may lose to cuts.
+    pub tolerance: f64,
+    /// How rays are traced, where the user has a wish.
+    pub trace: Option<Trace>,
     /// Seed of everything random.
     pub seed: u64,
     /// Effects that are simulated.
@@ -66,8 +72,24 @@ const MOST_SAMPLES: u32 = 1 << 20;
 /// Visible normals that all samples of a pixel should take of a rough surface.
 const NORMALS: u32 = 256;
 
+/// The longest chain of interfaces, where the user has no wish.
+const DEPTH: u32 = 32;
+
+/// The same where a tolerance is asked for: long enough that few pixels miss it, short enough to end.
+const DEPTH_OF_TOLERANCE: u32 = 1024;
+
+/// Throughput that a pixel of `tree` may lose to cuts, where the user has no wish.
+const TOLERANCE: f64 = 0.01;
+
 /// Visible normals that one sample takes, at least and at most.
 const NORMALS_A_SAMPLE: RangeInclusive<u32> = 8..=16;
+
+impl Model {
+    /// Whether it follows rays from surface to surface.
+    pub fn traces(self) -> bool {
+        matches!(self, Self::Tree | Self::Path)
+    }
+}
 
 impl Plan {
     /// Visible normals of a rough surface that each sample of a pixel takes.
@@ -82,28 +104,38 @@ impl Plan {
     /// What `args` amount to for `scene`; the scene's own `[render]` table is not looked at, see [`RenderArgs::or`].
     pub fn new(scene: &Scene, args: &RenderArgs) -> Result<Self> {
         let model = args.model.unwrap_or(Model::Single);
-        if model != Model::Single {
-            let name = model.name();
-            return Err(Error::Usage(format!("--model {name}: this version has no such model yet; it has: single")));
-        }
-        if args.tolerance.is_some() {
+        let has: &[Aov] = match model {
+            Model::Single => &[Aov::Normal, Aov::Depth, Aov::Object],
+            Model::Tree => {
+                &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded]
+            }
+            Model::Double | Model::Path => {
+                let name = model.name();
+                return Err(Error::Usage(format!(
+                    "--model {name}: this version has no such model yet; it has: single, tree"
+                )));
+            }
+        };
+        if args.tolerance.is_some() && model == Model::Single {
             let hint = "model single has no error estimate; use --samples or --time-budget";
             return Err(Error::Usage(format!("--tolerance: {hint}")));
         }
         let mut aovs = args.aov.clone().unwrap_or_default();
         aovs.sort();
         aovs.dedup();
-        if let Some(aov) = aovs.iter().find(|aov| !matches!(aov, Aov::Normal | Aov::Depth | Aov::Object)) {
-            let name = aov.name();
-            return Err(Error::Usage(format!(
-                "--aov {name}: model single does not have it; it has: normal, depth, object"
-            )));
+        if let Some(aov) = aovs.iter().find(|aov| !has.contains(aov)) {
+            let (name, model) = (aov.name(), model.name());
+            let has: Vec<_> = has.iter().map(|aov| aov.name()).collect();
+            let has = has.join(", ");
+            return Err(Error::Usage(format!("--aov {name}: model {model} does not have it; it has: {has}")));
         }
         let size = args.size.unwrap_or(Size { width: 1024, height: 768 });
         let budget = match args.time_budget {
             Some(seconds) => Budget::Seconds { seconds, most: args.samples.unwrap_or(MOST_SAMPLES) },
             None => Budget::Samples(args.samples.unwrap_or(16)),
         };
+        let depth = if args.tolerance.is_some() { DEPTH_OF_TOLERANCE } else { DEPTH };
+        let max_depth = (model != Model::Single).then(|| args.max_depth.unwrap_or(depth));
         let selection = args.effects.clone().unwrap_or_default();
         let selected = selection.resolve(scene);
         let share = |honoured: bool| -> Effects {
@@ -113,6 +145,9 @@ impl Plan {
             model,
             size,
             budget,
+            max_depth,
+            tolerance: args.tolerance.unwrap_or(TOLERANCE),
+            trace: args.trace,
             seed: args.seed.unwrap_or(0),
             effects: share(true),
             unsupported: share(false),
@@ -123,6 +158,7 @@ impl Plan {
             options: args.clone().or(RenderArgs {
                 model: Some(model),
                 size: Some(size),
+                max_depth,
                 seed: Some(0),
                 effects: Some(selection),
                 exposure: Some(0.0),

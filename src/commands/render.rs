@@ -9,8 +9,8 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{Talk, devices, print};
 use crate::gpu::{DeviceInfo, Gpu, Instance};
 use crate::image::{FloatImage, ImageFormat, Layer, OutputFile, encode_exr, encode_png};
-use crate::options::RenderArgs;
-use crate::passes::{self, Aovs, Rendered};
+use crate::options::{Aov, Model, RenderArgs};
+use crate::passes::{self, Rendered};
 use crate::plan::{Budget, Plan};
 use crate::report::{Run, Stats};
 use crate::scene::{Overrides, Scene};
@@ -156,9 +156,10 @@ impl RenderCommand {
 /// Notes on options that are understood and change nothing here.
 fn idle_options(options: &RenderArgs, format: ImageFormat) -> Vec<String> {
     let exr = format == ImageFormat::Exr;
+    let single = options.model.is_none_or(|model| model == Model::Single);
     [
-        (options.max_depth.is_some(), "--max-depth", "model single sees one interface"),
-        (options.trace.is_some(), "--trace", "model single traces no rays"),
+        (single && options.max_depth.is_some(), "--max-depth", "model single sees one interface"),
+        (single && options.trace.is_some(), "--trace", "model single traces no rays"),
         (exr && options.exposure.is_some(), "--exposure", "an EXR holds radiance as it is"),
         (exr && options.tonemap.is_some(), "--tonemap", "an EXR holds radiance as it is"),
     ]
@@ -183,20 +184,31 @@ fn progress_bar(plan: &Plan, talk: Talk) -> ProgressBar {
 }
 
 fn float_image(rendered: &Rendered, plan: &Plan) -> FloatImage {
-    let mut layers = Vec::new();
-    if let Some(Aovs { normal, depth, object }) = &rendered.aovs {
-        let channel = |name: &str, values: Vec<f32>| (name.to_owned(), values);
-        for aov in &plan.aovs {
-            let axis = |axis: usize| normal.iter().map(|normal| normal[axis]).collect();
-            let channels = match aov.name() {
-                "normal" => vec![channel("X", axis(0)), channel("Y", axis(1)), channel("Z", axis(2))],
-                "depth" => vec![channel("Z", depth.clone())],
-                _ => vec![channel("ID", object.clone())],
-            };
-            layers.push(Layer { name: aov.name().into(), channels });
-        }
-    }
+    let layers = plan.aovs.iter().filter_map(|&aov| {
+        let channels = channels(aov, rendered)?.into_iter().map(|(name, values)| (name.to_owned(), values)).collect();
+        Some(Layer { name: aov.name().into(), channels })
+    });
+    let layers = layers.collect();
     FloatImage { width: plan.size.width, height: plan.size.height, pixels: rendered.radiance.clone(), layers }
+}
+
+/// The channels of a layer, if this render has it.
+fn channels(aov: Aov, rendered: &Rendered) -> Option<Vec<(&'static str, Vec<f32>)>> {
+    let one = |name, values: &Vec<f32>| vec![(name, values.clone())];
+    let three = |names: [&'static str; 3], values: &Vec<[f32; 3]>| {
+        let channel = |axis: usize| (names[axis], values.iter().map(|value| value[axis]).collect());
+        (0..3).map(channel).collect()
+    };
+    let (surfaces, tree) = (rendered.aovs.as_ref(), rendered.tree.as_ref());
+    match aov {
+        Aov::Normal => surfaces.map(|aovs| three(["X", "Y", "Z"], &aovs.normal)),
+        Aov::Depth => surfaces.map(|aovs| one("Z", &aovs.depth)),
+        Aov::Albedo => surfaces.map(|aovs| three(["R", "G", "B"], &aovs.albedo)),
+        Aov::Object => surfaces.map(|aovs| one("ID", &aovs.object)),
+        Aov::Interfaces => tree.map(|tree| one("N", &tree.interfaces)),
+        Aov::Discarded => tree.map(|tree| one("Y", &tree.discarded)),
+        Aov::Stderr => None,
+    }
 }
 
 /// What the image says about its making; nothing that differs from run to run.

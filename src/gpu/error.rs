@@ -44,6 +44,13 @@ pub enum GpuError {
         found: Vec<String>,
     },
 
+    /// Ray queries were asked for and the device has none.
+    #[error("--trace hardware: device {name:?} has no ray queries; use --trace software, or choose another with --device")]
+    NoRayQuery {
+        /// The device.
+        name: String,
+    },
+
     /// The validation layer was asked for and is not installed.
     #[error(
         "--validation needs VK_LAYER_KHRONOS_validation; install it (Debian, Ubuntu: vulkan-validationlayers) or run ci/setup.sh"
@@ -90,9 +97,11 @@ impl GpuError {
     /// 2 where another command line would do, 3 where no device can be used.
     pub fn exit_code(&self) -> u8 {
         match self {
-            Self::OutOfMemory { .. } | Self::TooLarge { .. } | Self::UnknownDevice { .. } | Self::NoValidationLayer => {
-                2
-            }
+            Self::OutOfMemory { .. }
+            | Self::TooLarge { .. }
+            | Self::UnknownDevice { .. }
+            | Self::NoRayQuery { .. }
+            | Self::NoValidationLayer => 2,
             _ => 3,
         }
     }

@@ -276,7 +276,7 @@ fn find(wanted: &str, names: &[&str]) -> Option<usize> {
 }
 
 /// Storage buffers that one shader sees at most.
-const STORAGE_BUFFERS: u32 = 8;
+const STORAGE_BUFFERS: u32 = 16;
 
 /// What Vitrum needs of a device, and this one lacks.
 fn missing(
@@ -294,7 +294,7 @@ fn missing(
         (features.dynamic_rendering == vk::TRUE, "the feature dynamicRendering"),
         (features.synchronization2 == vk::TRUE, "the feature synchronization2"),
         (features.maintenance4 == vk::TRUE, "the feature maintenance4"),
-        (limits.max_per_stage_descriptor_storage_buffers >= STORAGE_BUFFERS, "8 storage buffers in one shader"),
+        (limits.max_per_stage_descriptor_storage_buffers >= STORAGE_BUFFERS, "16 storage buffers in one shader"),
         (depth.contains(vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT), "depth images of 32-bit float"),
         (queue, "a queue for graphics and compute"),
     ] {
@@ -356,7 +356,7 @@ mod tests {
             .dynamic_rendering(true)
             .synchronization2(true)
             .maintenance4(true);
-        let limits = vk::PhysicalDeviceLimits { max_per_stage_descriptor_storage_buffers: 8, ..Default::default() };
+        let limits = vk::PhysicalDeviceLimits { max_per_stage_descriptor_storage_buffers: 16, ..Default::default() };
         let depth = vk::FormatFeatureFlags::DEPTH_STENCIL_ATTACHMENT;
         assert!(missing(vk::API_VERSION_1_3, &features, &limits, depth, true).is_empty());
         let old = missing(vk::make_api_version(0, 1, 2, 131), &features, &limits, depth, true);

@@ -45,6 +45,11 @@ pub struct Frame {
     pub normals_in_all: u32,
     pub environment_levels: u32,
     pub environment_size: [u32; 2],
+    pub max_depth: u32,
+    pub tolerance: f32,
+    pub camera_bodies: [u32; 4],
+    pub camera_index: f32,
+    pub camera_medium: u32,
     pub padding: [u32; 2],
 }
 
@@ -62,23 +67,45 @@ impl Frame {
 pub struct InstanceRecord {
     pub object_to_world: Matrix4x3,
     pub normal_to_world: Matrix4x3,
-    pub ray_origin: Vec3,
-    pub first_triangle: u32,
     pub world_to_object: Matrix4x3,
+    pub first_triangle: u32,
     pub first_vertex: u32,
+    pub first_node: u32,
     pub material: u32,
     pub smooth_normals: u32,
     pub number: u32,
+    pub rank: u32,
+    pub mesh: u32,
 }
 
-/// `Material`: a dielectric.
+/// `Material`: a surface and what is behind it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "shared.glsl describes the members")]
 pub struct MaterialRecord {
+    pub absorption: Vec3,
     pub refraction_index: f32,
+    pub base_color: Vec3,
     pub roughness: f32,
+    pub emission: Vec3,
+    pub metallic: f32,
+    pub sellmeier_strengths: Vec3,
+    pub dispersion: f32,
+    pub sellmeier_resonances: Vec3,
+    pub specular: f32,
+    pub kind: u32,
     pub albedo_table: u32,
+    pub texture: u32,
+    pub padding: u32,
+}
+
+impl MaterialRecord {
+    /// `DIELECTRIC`.
+    pub const DIELECTRIC: u32 = 0;
+    /// `PANE`.
+    pub const PANE: u32 = 1;
+    /// `OPAQUE`.
+    pub const OPAQUE: u32 = 2;
 }
 
 /// `Light`: a point light.
@@ -101,4 +128,7 @@ pub struct SamplePush {
     pub clip_offset: Vec2,
     pub instance_index: u32,
     pub sample_index: u32,
+    pub first_row: u32,
+    pub wavelengths: u32,
+    pub spectrum: [[f32; 4]; 4],
 }

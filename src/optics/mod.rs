@@ -10,3 +10,4 @@ pub mod offset;
 pub mod original;
 mod pair;
 pub mod rough;
+pub mod spectrum;

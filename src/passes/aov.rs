@@ -1,6 +1,7 @@
 //! What lies at the centre of each pixel: normal, distance, object. Not antialiased, so that values stay what they are.
 
-use super::resources::{Draw, Resources};
+use super::geometry::Draw;
+use super::resources::Resources;
 use super::view;
 use crate::gpu::{
     Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
@@ -20,6 +21,8 @@ pub struct Aovs {
     pub depth: Vec<f32>,
     /// Number of the object, from 1.
     pub object: Vec<f32>,
+    /// Base colour; of dielectrics white.
+    pub albedo: Vec<[f32; 3]>,
 }
 
 pub(super) struct AovPass {
@@ -55,7 +58,7 @@ impl AovPass {
         let Size { width, height } = size;
         let uses = &[Use::ColorTarget, Use::CopySource];
         let image = |name| Image::new(&gpu, &ImageDesc { name, width, height, format: VALUES, uses });
-        let (normal_depth, object) = (image("normal and depth")?, image("object")?);
+        let (normal_depth, object) = (image("normal and depth")?, image("albedo and object")?);
         let desc =
             ImageDesc { name: "depth of aov", width, height, format: Format::Depth32, uses: &[Use::DepthTarget] };
         let depth = Image::new(&gpu, &desc)?;
@@ -79,7 +82,8 @@ impl AovPass {
         let aovs = Aovs {
             normal: normal_depth.iter().map(|&[x, y, z, _]| [x, y, z]).collect(),
             depth: normal_depth.iter().map(|&[.., length]| metres(length)).collect(),
-            object: object.iter().map(|&[number, ..]| number).collect(),
+            object: object.iter().map(|&[.., number]| number).collect(),
+            albedo: object.iter().map(|&[r, g, b, _]| [r, g, b]).collect(),
         };
         Ok((aovs, time))
     }

@@ -5,20 +5,23 @@
 
 mod accumulate;
 mod aov;
+mod bvh;
 mod display;
 mod environment;
+mod geometry;
 mod resources;
 mod sampling;
 mod single;
+mod tree;
 mod view;
 
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use crate::gpu::{
-    Bind, BindGroup, Commands, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Recorder, Result, SamplePush, Use,
+    Bind, BindGroup, Commands, DeviceKind, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Result, SamplePush, Use,
 };
-use crate::options::Size;
+use crate::options::{Model, Size, Trace};
 use crate::plan::{Budget, Plan};
 use crate::scene::Scene;
 
@@ -26,11 +29,14 @@ use accumulate::Accumulate;
 use aov::AovPass;
 use display::Display;
 use environment::EnvironmentPass;
-use resources::{Draw, Resources};
+use geometry::Draw;
+use resources::Resources;
 use single::Single;
+use tree::Tree;
 
 pub use aov::Aovs;
 pub use sampling::pixel_offsets;
+pub use tree::TreeCounts;
 
 /// Radiance in flight, and means of it.
 const RADIANCE: Format = Format::Rgba32Float;
@@ -44,12 +50,18 @@ pub struct Rendered {
     pub display: Vec<[u8; 4]>,
     /// What lies at the centres of the pixels, if it was asked for.
     pub aovs: Option<Aovs>,
+    /// What the model `tree` counted.
+    pub tree: Option<TreeCounts>,
+    /// How rays were traced, if any were.
+    pub trace: Option<Trace>,
     /// Samples per pixel.
     pub samples: u32,
     /// Device time of each pass, over all samples.
     pub passes: Vec<PassTime>,
     /// Host time until the scene was on the device.
     pub upload: Duration,
+    /// Host time of that for hierarchies over triangles, if rays were traced.
+    pub acceleration: Option<Duration>,
     /// Host time until every pipeline had run once: drivers compile at the first use.
     pub pipelines: Duration,
 }
@@ -65,7 +77,19 @@ pub fn check(gpu: &Gpu, plan: &Plan) -> Result<()> {
             advice: "use a smaller --size",
         });
     }
-    Ok(())
+    trace_of(gpu, plan).map(|_| ())
+}
+
+/// How rays are traced, if they are: as the plan wishes, else as is faster.
+fn trace_of(gpu: &Gpu, plan: &Plan) -> Result<Option<Trace>> {
+    let info = gpu.info();
+    match plan.trace {
+        _ if !plan.model.traces() => Ok(None),
+        Some(Trace::Hardware) if !info.ray_query => Err(GpuError::NoRayQuery { name: info.name.clone() }),
+        Some(trace) => Ok(Some(trace)),
+        None if info.ray_query && info.kind != DeviceKind::Cpu => Ok(Some(Trace::Hardware)),
+        None => Ok(Some(Trace::Software)),
+    }
 }
 
 /// Renders `scene` as `plan` says. `progress` hears how many samples are done.
@@ -73,18 +97,20 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
     let start = Instant::now();
     check(gpu, plan)?;
     let mut commands = Commands::new(gpu)?;
-    let resources = Resources::new(&mut commands, scene, plan)?;
+    let trace = trace_of(gpu, plan)?;
+    let resources = Resources::new(&mut commands, scene, plan, trace)?;
     let upload = start.elapsed();
 
-    let passes = Passes::new(&mut commands, &resources, plan)?;
+    let mut passes = Passes::new(&mut commands, &resources, plan, trace)?;
     let set_up = start.elapsed();
 
-    let targets = Targets::new(gpu, plan.size)?;
+    let targets = Targets::new(gpu, plan.size, &resources, plan.model)?;
     let mut times = Times::default();
     let mut samples = 0;
     for offset in sampling::pixel_offsets(plan.budget, plan.seed) {
         let push = view::sample_push(plan.size, offset, samples);
-        times.add(commands.run(|cmd| passes.sample(cmd, &resources, &targets, &resources.draws, push))?);
+        let push = passes.model.lit(push, plan.budget);
+        times.add(passes.sample(&mut commands, &resources, &targets, &resources.draws, push)?);
         samples += 1;
         progress(samples);
         if is_spent(plan.budget, set_up, start.elapsed(), samples) {
@@ -94,41 +120,84 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
 
     let (display, time) = passes.display.run(&mut commands, &targets, plan)?;
     times.add(time);
-    let radiance = radiance(&commands.read_image(&targets.mean)?)?;
+    let mean = commands.read_image(&targets.mean)?;
+    let radiance = radiance(&mean)?;
+    let tree = match &targets.counts {
+        Some(counts) => Some(TreeCounts::new(&mean, &commands.read_image(counts)?, samples)),
+        None => None,
+    };
     let mut aovs = None;
     if let Some(pass) = &passes.aov {
         let (values, time) = pass.run(&mut commands, &resources, &resources.draws, plan.size)?;
         times.add(time);
         aovs = Some(values);
     }
-    Ok(Rendered { radiance, display, aovs, samples, passes: times.0, upload, pipelines: set_up - upload })
+    Ok(Rendered {
+        radiance,
+        display,
+        aovs,
+        tree,
+        trace,
+        samples,
+        passes: times.0,
+        upload,
+        acceleration: resources.acceleration,
+        pipelines: set_up - upload,
+    })
 }
 
 /// The passes of a sample, in their order, and those that end the frame.
 struct Passes {
-    single: Single,
-    environment: EnvironmentPass,
-    accumulate: Accumulate,
+    model: ModelPass,
     display: Display,
     aov: Option<AovPass>,
 }
 
+/// The passes of one light transport model.
+enum ModelPass {
+    /// Rasterised: what is covered, what is not, the mean of both.
+    Raster { single: Single, environment: EnvironmentPass, accumulate: Accumulate },
+    /// Every pixel from the camera on.
+    Tree(Tree),
+}
+
+impl ModelPass {
+    /// What a sample tells the shaders beyond its place in the pixel.
+    fn lit(&self, push: SamplePush, budget: Budget) -> SamplePush {
+        match self {
+            Self::Raster { .. } => push,
+            Self::Tree(_) => sampling::spectrum(push, budget),
+        }
+    }
+}
+
 impl Passes {
     /// Makes every pipeline and runs each once on a few pixels, so that no time of a pass holds its compilation.
-    fn new(commands: &mut Commands, resources: &Resources, plan: &Plan) -> Result<Self> {
+    fn new(commands: &mut Commands, resources: &Resources, plan: &Plan, trace: Option<Trace>) -> Result<Self> {
         let gpu = commands.gpu().clone();
         let small = Size { width: 16, height: 16 };
-        let targets = Targets::new(&gpu, small)?;
-        let passes = Self {
-            single: Single::new(&gpu, resources)?,
-            environment: EnvironmentPass::new(&gpu, resources)?,
-            accumulate: Accumulate::new(&gpu, &targets)?,
+        let targets = Targets::new(&gpu, small, resources, plan.model)?;
+        let model = match (&targets.tree, trace) {
+            (Some(group), Some(trace)) => ModelPass::Tree(Tree::new(&gpu, resources, group, trace)?),
+            _ => ModelPass::Raster {
+                single: Single::new(&gpu, resources)?,
+                environment: EnvironmentPass::new(&gpu, resources)?,
+                accumulate: Accumulate::new(&gpu, &targets)?,
+            },
+        };
+        let mut passes = Self {
+            model,
             display: Display::new(&gpu, &targets)?,
-            aov: if plan.aovs.is_empty() { None } else { Some(AovPass::new(&gpu, resources)?) },
+            aov: if plan.aovs.iter().any(|aov| aov.is_of_surfaces()) {
+                Some(AovPass::new(&gpu, resources)?)
+            } else {
+                None
+            },
         };
         let few: Vec<_> =
             resources.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect();
-        commands.run(|cmd| passes.sample(cmd, resources, &targets, &few, SamplePush::default()))?;
+        let push = passes.model.lit(SamplePush::default(), plan.budget);
+        passes.sample(commands, resources, &targets, &few, push)?;
         passes.display.run(commands, &targets, plan)?;
         if let Some(aov) = &passes.aov {
             aov.run(commands, resources, &few, small)?;
@@ -136,17 +205,22 @@ impl Passes {
         Ok(passes)
     }
 
-    fn sample<'r>(
-        &'r self,
-        cmd: &mut Recorder<'_, 'r>,
-        resources: &'r Resources,
-        targets: &'r Targets,
+    fn sample(
+        &mut self,
+        commands: &mut Commands,
+        resources: &Resources,
+        targets: &Targets,
         draws: &[Draw],
         push: SamplePush,
-    ) {
-        cmd.timed("single", |cmd| self.single.record(cmd, resources, targets, draws, push));
-        cmd.timed("environment", |cmd| self.environment.record(cmd, resources, targets, push));
-        cmd.timed("accumulate", |cmd| self.accumulate.record(cmd, targets, push.sample_index));
+    ) -> Result<Vec<PassTime>> {
+        match &mut self.model {
+            ModelPass::Raster { single, environment, accumulate } => commands.run(|cmd| {
+                cmd.timed("single", |cmd| single.record(cmd, resources, targets, draws, push));
+                cmd.timed("environment", |cmd| environment.record(cmd, resources, targets, push));
+                cmd.timed("accumulate", |cmd| accumulate.record(cmd, targets, push.sample_index));
+            }),
+            ModelPass::Tree(tree) => tree.sample(commands, targets, push),
+        }
     }
 }
 
@@ -154,23 +228,36 @@ impl Passes {
 struct Targets {
     accumulation: BindGroup,
     display: BindGroup,
+    /// The scene with the images that `tree` writes.
+    tree: Option<BindGroup>,
     radiance: Arc<Image>,
     mean: Arc<Image>,
+    counts: Option<Arc<Image>>,
     depth: Image,
 }
 
 impl Targets {
-    fn new(gpu: &Gpu, Size { width, height }: Size) -> Result<Self> {
+    fn new(gpu: &Gpu, Size { width, height }: Size, resources: &Resources, model: Model) -> Result<Self> {
         let image = |name, format, uses| Image::new(gpu, &ImageDesc { name, width, height, format, uses });
         let radiance = Arc::new(image("radiance", RADIANCE, &[Use::ColorTarget, Use::Sampled])?);
         let mean = Arc::new(image("mean", RADIANCE, &[Use::Storage, Use::Sampled, Use::CopySource])?);
         let depth = image("depth", Format::Depth32, &[Use::DepthTarget])?;
         let accumulation = vec![Bind::Sampled(radiance.clone()), Bind::Storage(mean.clone())];
+        let (mut counts, mut tree) = (None, None);
+        if model == Model::Tree {
+            let image = Arc::new(image("counts", RADIANCE, &[Use::Storage, Use::CopySource])?);
+            let mut bindings = resources.traced.clone();
+            bindings.extend([Bind::Storage(mean.clone()), Bind::Storage(image.clone())]);
+            tree = Some(BindGroup::new(gpu, "tree", bindings)?);
+            counts = Some(image);
+        }
         Ok(Self {
             accumulation: BindGroup::new(gpu, "accumulation", accumulation)?,
             display: BindGroup::new(gpu, "display", vec![Bind::Sampled(mean.clone())])?,
+            tree,
             radiance,
             mean,
+            counts,
             depth,
         })
     }

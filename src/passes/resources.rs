@@ -1,20 +1,24 @@
 //! The scene on the device.
 
 use std::sync::Arc;
+use std::time::{Duration, Instant};
 
-use glam::{DAffine3, DMat3, DVec3, Vec3};
+use glam::{DVec3, Vec3};
 use half::f16;
 
+use super::geometry::{Draw, Geometry};
 use super::view::View;
 use crate::effects::{Effect, SMOOTH};
 use crate::gpu::{
-    Bind, BindGroup, Commands, Format, Frame, Gpu, Image, ImageDesc, InstanceRecord, LightRecord, MaterialRecord,
-    Result, Sides, Specialization, Use,
+    Bind, BindGroup, Commands, Format, Frame, Gpu, GpuError, Image, ImageDesc, LightRecord, MaterialRecord, Result,
+    Specialization, Use,
 };
 use crate::optics::compensation::AlbedoTable;
+use crate::optics::medium::absorption;
 use crate::optics::rough::RoughInterface;
 use crate::plan::{Budget, Plan};
-use crate::scene::{Dielectric, Material, Mesh, Panorama, Scene, Surface, Surroundings};
+use crate::options::Trace;
+use crate::scene::{Dielectric, Material, Opaque, Panorama, Scene, Surface, Surroundings};
 
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
@@ -22,18 +26,35 @@ const ENVIRONMENT_IMAGE: u32 = 64;
 /// Buffers and images that every pass sees, as one group.
 pub(super) struct Resources {
     pub(super) group: BindGroup,
+    /// The same with what only traced models read.
+    pub(super) traced: Vec<Bind>,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
     /// From lengths on the device to metres.
     pub(super) metres_per_unit: f64,
+    /// Host time that hierarchies took, if there are any.
+    pub(super) acceleration: Option<Duration>,
 }
 
+/// Groups that `shaders/trace_software.glsl` has room for.
+const TRACE_STACK: u32 = 48;
+
 impl Resources {
-    pub(super) fn new(commands: &mut Commands, scene: &Scene, plan: &Plan) -> Result<Self> {
+    pub(super) fn new(commands: &mut Commands, scene: &Scene, plan: &Plan, trace: Option<Trace>) -> Result<Self> {
         let view = View::new(&scene.camera, scene.bounds(), plan.size);
-        let geometry = Geometry::new(scene, &view);
-        let (materials, albedos) = materials(scene, plan);
+        let start = Instant::now();
+        let geometry = Geometry::new(scene, &view, trace);
+        let acceleration = trace.map(|_| start.elapsed());
+        if geometry.depth > TRACE_STACK {
+            return Err(GpuError::TooLarge {
+                what: "the depth of the hierarchy over the triangles".into(),
+                size: geometry.depth.to_string(),
+                limit: TRACE_STACK.to_string(),
+                advice: "remove triangles that are millions of times smaller than the others",
+            });
+        }
+        let (materials, albedos) = materials(scene, plan, &view);
         let lights = lights(scene, &view);
         let single = Panorama::new(1, 1, vec![[1.0; 3]]);
         let (panorama, specialization) = match &scene.environment.light {
@@ -47,6 +68,7 @@ impl Resources {
             environment_levels: levels,
             ..frame(scene, plan, &view, lights.len() as u32)
         };
+        let ranked = ranked_materials(scene, &geometry);
         let buffers = vec![
             commands.upload_buffer("frame", &[frame])?,
             commands.upload_buffer("instances", &geometry.instances)?,
@@ -57,112 +79,40 @@ impl Resources {
             commands.upload_buffer("triangles", &geometry.triangles)?,
         ];
         commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
-        let mut bindings: Vec<_> = buffers.into_iter().map(|buffer| Bind::Buffer(Arc::new(buffer))).collect();
+        let buffer = |buffer| Bind::Buffer(Arc::new(buffer));
+        let mut bindings: Vec<_> = buffers.into_iter().map(buffer).collect();
         bindings.push(Bind::Sampled(Arc::new(environment)));
-        bindings.push(Bind::Buffer(Arc::new(commands.upload_buffer("albedos", &albedos)?)));
+        bindings.push(buffer(commands.upload_buffer("albedos", &albedos)?));
+        let mut traced = Vec::new();
+        if trace.is_some() {
+            traced.clone_from(&bindings);
+            traced.push(buffer(commands.upload_buffer("nodes of the hierarchies", &geometry.nodes)?));
+            traced.push(buffer(commands.upload_buffer("corners of the triangles", &geometry.corners)?));
+            traced.push(buffer(commands.upload_buffer("materials of the bodies", &ranked)?));
+            traced.push(buffer(commands.upload_buffer("texture coordinates", &[0.0_f32])?));
+            traced.push(buffer(commands.upload_buffer("texels", &[0_u32])?));
+        }
         Ok(Self {
             group: BindGroup::new(commands.gpu(), "scene", bindings)?,
+            traced,
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects).with(ENVIRONMENT_IMAGE, specialization),
             metres_per_unit: 1.0 / view.units_per_metre,
+            acceleration,
         })
     }
 }
 
-/// An instance, as it is drawn.
-#[derive(Clone, Copy)]
-pub(super) struct Draw {
-    pub(super) vertices: u32,
-    pub(super) sides: Sides,
-}
-
-/// Every mesh once, and the instances of them that are dielectrics.
-#[derive(Default)]
-struct Geometry {
-    positions: Vec<f32>,
-    normals: Vec<f32>,
-    triangles: Vec<u32>,
-    instances: Vec<InstanceRecord>,
-    draws: Vec<Draw>,
-}
-
-impl Geometry {
-    fn new(scene: &Scene, view: &View) -> Self {
-        let mut all = Self::default();
-        let places: Vec<_> = scene.meshes.iter().map(|mesh| all.add(mesh)).collect();
-        let to_device =
-            DAffine3::from_scale(DVec3::splat(view.units_per_metre)) * DAffine3::from_translation(-view.position);
-        for object in &scene.objects {
-            if matches!(scene.materials[object.material].surface, Surface::Opaque(_)) {
-                continue;
-            }
-            let mesh = &scene.meshes[object.mesh];
-            let place = &places[object.mesh];
-            let object_to_world = to_device * object.transform * place.to_mesh;
-            let world_to_object = object_to_world.inverse();
-            all.instances.push(InstanceRecord {
-                object_to_world: object_to_world.into(),
-                normal_to_world: world_to_object.matrix3.transpose().into(),
-                ray_origin: world_to_object.translation.as_vec3(),
-                first_triangle: place.first_triangle,
-                world_to_object: DMat3::into(world_to_object.matrix3),
-                first_vertex: place.first_vertex,
-                material: object.material as u32,
-                smooth_normals: u32::from(object.smooth && !mesh.normals.is_empty()),
-                number: object.number as u32 + 1,
-            });
-            all.draws.push(Draw {
-                vertices: 3 * mesh.triangles.len() as u32,
-                sides: Sides {
-                    clockwise: object_to_world.matrix3.determinant() < 0.0,
-                    // What is nearest of such a body is a front, unless it cuts through itself inside out: leaving out the
-                    // backs changes nothing but the time.
-                    fronts_only: scene.is_seen_from_outside(object),
-                },
-            });
-        }
-        all
-    }
-
-    fn add(&mut self, mesh: &Mesh) -> Place {
-        let bounds = mesh.bounds();
-        let center = bounds.center();
-        // A power of two, so that scaling rounds nothing.
-        let scale = bounds.farthest(center).max(f64::MIN_POSITIVE).log2().ceil().exp2();
-        let place = Place {
-            first_vertex: (self.positions.len() / 3) as u32,
-            first_triangle: (self.triangles.len() / 3) as u32,
-            to_mesh: DAffine3::from_translation(center) * DAffine3::from_scale(DVec3::splat(scale)),
-        };
-        for &position in &mesh.positions {
-            let unit = (Vec3::from(position).as_dvec3() - center) / scale;
-            self.positions.extend(unit.as_vec3().to_array());
-        }
-        match mesh.normals.is_empty() {
-            // Never read, but vertices share one numbering.
-            true => self.normals.resize(self.positions.len(), 0.0),
-            false => self.normals.extend(mesh.normals.iter().flatten()),
-        }
-        self.triangles.extend(mesh.triangles.iter().flatten());
-        place
-    }
-}
-
-/// Where a mesh lies in the buffers, scaled to the unit ball; `to_mesh` undoes that.
-struct Place {
-    first_vertex: u32,
-    first_triangle: u32,
-    to_mesh: DAffine3,
-}
-
 /// Materials, and the tables of what rough ones lose.
-fn materials(scene: &Scene, plan: &Plan) -> (Vec<MaterialRecord>, Vec<f32>) {
+fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<MaterialRecord>, Vec<f32>) {
     let mut tables: Vec<(RoughInterface, u32)> = Vec::new();
     let mut albedos = Vec::new();
     let record = |material: &Material| {
-        let Surface::Dielectric(Dielectric { ior, roughness, .. }) = material.surface else {
-            return MaterialRecord::default();
+        let glass = match &material.surface {
+            Surface::Dielectric(glass) => glass,
+            Surface::Opaque(opaque) => return opaque_record(opaque),
         };
+        let &Dielectric { ior, roughness, .. } = glass;
         let mut albedo_table = 0;
         if plan.effects.contains(Effect::EnergyCompensation) && is_rough(material) {
             let interface = RoughInterface { alpha: roughness * roughness, eta_i: 1.0, eta_t: ior };
@@ -176,9 +126,59 @@ fn materials(scene: &Scene, plan: &Plan) -> (Vec<MaterialRecord>, Vec<f32>) {
                 }
             };
         }
-        MaterialRecord { refraction_index: ior as f32, roughness: roughness as f32, albedo_table }
+        // Infinite where a colour is 0: so dark that nothing is left after a millionth of the scene.
+        let per_unit = |color| (absorption(color, glass.attenuation_distance) / view.units_per_metre).min(1e8) as f32;
+        let [r, g, b] = glass.attenuation_color.to_array().map(per_unit);
+        MaterialRecord {
+            absorption: Vec3::new(r, g, b),
+            refraction_index: ior as f32,
+            base_color: Vec3::ONE,
+            roughness: roughness as f32,
+            dispersion: glass.dispersion as f32,
+            kind: if glass.thin_walled { MaterialRecord::PANE } else { MaterialRecord::DIELECTRIC },
+            albedo_table,
+            ..MaterialRecord::default()
+        }
     };
     (scene.materials.iter().map(record).collect(), albedos)
+}
+
+fn opaque_record(opaque: &Opaque) -> MaterialRecord {
+    MaterialRecord {
+        base_color: opaque.base_color.as_vec3(),
+        roughness: opaque.roughness as f32,
+        emission: opaque.emission.as_vec3(),
+        metallic: opaque.metallic as f32,
+        specular: opaque.specular as f32,
+        kind: MaterialRecord::OPAQUE,
+        ..MaterialRecord::default()
+    }
+}
+
+/// The material of each body by its rank, which counts from 1.
+fn ranked_materials(scene: &Scene, geometry: &Geometry) -> Vec<u32> {
+    let most = geometry.instances.iter().map(|instance| instance.rank).max().unwrap_or(0);
+    let mut materials = vec![0; most as usize + 1];
+    for (instance, &object) in geometry.instances.iter().zip(&geometry.objects) {
+        materials[instance.rank as usize] = scene.objects[object].material as u32;
+    }
+    materials
+}
+
+/// The ranks of the bodies around the camera, as `shaders/media.glsl` holds them.
+fn camera_bodies(scene: &Scene) -> [u32; 4] {
+    let ranks = scene.ranks();
+    let mut inside: Vec<u32> = scene.bodies_around_camera().into_iter().map(|object| ranks[object]).collect();
+    inside.sort_unstable_by(|a, b| b.cmp(a));
+    inside.resize(8, 0);
+    std::array::from_fn(|i| inside[2 * i] << 16 | inside[2 * i + 1])
+}
+
+/// The material around the camera.
+fn camera_medium(scene: &Scene) -> Option<usize> {
+    let ranks = scene.ranks();
+    let highest = scene.bodies_around_camera().into_iter().max_by_key(|&object| ranks[object]);
+    highest.map(|object| scene.objects[object].material)
 }
 
 /// Whether light is spread by a surface of that material.
@@ -203,6 +203,8 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         Surroundings::Image(_) => DVec3::splat(environment.intensity),
         Surroundings::Color(color) => color * environment.intensity,
     };
+    let nests = plan.model.traces() && plan.effects.contains(Effect::Nesting);
+    let medium = if nests { camera_medium(scene) } else { None };
     Frame {
         view_projection: Frame::columns(view.view_projection),
         ray_corner: view.ray_corner.as_vec3(),
@@ -223,7 +225,19 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
             Budget::Samples(samples) => samples.saturating_mul(plan.normals()),
             Budget::Seconds { .. } => 0,
         },
+        max_depth: plan.max_depth.unwrap_or(1),
+        tolerance: plan.tolerance as f32,
+        camera_bodies: if nests { camera_bodies(scene) } else { [0; 4] },
+        camera_index: medium.map_or(1.0, |medium| index(&scene.materials[medium])),
+        camera_medium: medium.map_or(0, |medium| medium as u32 + 1),
         ..Frame::default()
+    }
+}
+
+fn index(material: &Material) -> f32 {
+    match &material.surface {
+        Surface::Dielectric(glass) => glass.ior as f32,
+        Surface::Opaque(_) => 1.0,
     }
 }
 

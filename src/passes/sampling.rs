@@ -1,7 +1,9 @@
 //! Where in a pixel its samples lie: low-discrepancy points under a box filter.
 
-use glam::DVec2;
+use glam::{DVec2, FloatExt as _};
 
+use crate::gpu::SamplePush;
+use crate::optics::spectrum::{self, WAVELENGTHS};
 use crate::plan::Budget;
 
 /// 1 / golden ratio: its multiples fill an interval more evenly than those of any other number.
@@ -25,6 +27,22 @@ pub fn pixel_offsets(budget: Budget, seed: u64) -> Box<dyn Iterator<Item = DVec2
         ),
         Budget::Seconds { most, .. } => Box::new((0..most).map(move |i| place(0.5 + f64::from(i) * PLASTIC))),
     }
+}
+
+/// `push` with the wavelengths of its sample: those of all samples share the spectrum evenly.
+pub(super) fn spectrum(push: SamplePush, budget: Budget) -> SamplePush {
+    let index = f64::from(push.sample_index);
+    let shift = match budget {
+        // Not in the order of the lattice's first axis, or wavelengths would go with places in the pixel.
+        Budget::Samples(count) => {
+            let count = f64::from(count);
+            (((index * GOLDEN).fract_gl() * count).floor() + 0.5) / count
+        }
+        Budget::Seconds { .. } => (0.5 + index * GOLDEN).fract_gl(),
+    };
+    let lines = spectrum::lines(shift);
+    let spectrum = lines.map(|line| line.weight.extend(line.wavelength).as_vec4().to_array());
+    SamplePush { wavelengths: WAVELENGTHS as u32, spectrum, ..push }
 }
 
 fn shift(seed: u64) -> DVec2 {

@@ -1,6 +1,7 @@
 //! The original model: a depth-tested forward pass over the objects.
 
-use super::resources::{Draw, Resources};
+use super::geometry::Draw;
+use super::resources::Resources;
 use super::{RADIANCE, Targets};
 use crate::gpu::{Depth, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Recorder, Result, SamplePush, Target, shaders};
 

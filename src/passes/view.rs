@@ -53,7 +53,7 @@ pub(super) fn sample_push(size: Size, offset: DVec2, sample_index: u32) -> Sampl
     // The scene moves against the offset, and up is up in clip space.
     let clip = DVec2::new(-2.0 * offset.x / f64::from(size.width), 2.0 * offset.y / f64::from(size.height));
     let narrow = |v: DVec2| Vec2::new(v.x as f32, v.y as f32);
-    SamplePush { jitter: narrow(offset), clip_offset: narrow(clip), instance_index: 0, sample_index }
+    SamplePush { jitter: narrow(offset), clip_offset: narrow(clip), sample_index, ..SamplePush::default() }
 }
 
 #[cfg(test)]

@@ -5,6 +5,7 @@ use std::time::Duration;
 use serde::Serialize;
 
 use crate::gpu::{DeviceInfo, PassTime};
+use crate::options::Trace;
 use crate::passes::Rendered;
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -31,7 +32,7 @@ pub struct Stats {
     pub wall_ms: f64,
     pub rays: Option<u64>,
     pub peak_gpu_bytes: u64,
-    pub discarded: Option<()>,
+    pub discarded: Option<DiscardedStats>,
     pub stderr: Option<()>,
     pub non_finite_pixels: usize,
     pub validation_messages: Option<usize>,
@@ -66,6 +67,21 @@ impl DeviceStats {
 pub struct PassStats {
     pub name: &'static str,
     pub gpu_ms: Option<f64>,
+}
+
+/// Throughput that was cut off: of the worst pixel, and of the mean one.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/stats.md describes the members")]
+pub struct DiscardedStats {
+    pub max: f32,
+    pub mean: f64,
+}
+
+impl DiscardedStats {
+    fn new(discarded: &[f32]) -> Self {
+        let sum: f64 = discarded.iter().map(|&x| f64::from(x)).sum();
+        Self { max: discarded.iter().copied().fold(0.0, f32::max), mean: sum / discarded.len() as f64 }
+    }
 }
 
 /// Host times before the first sample, in milliseconds.
@@ -104,22 +120,22 @@ impl Stats {
             model: plan.model.name(),
             size: [plan.size.width, plan.size.height],
             samples: rendered.samples,
-            max_depth: None,
+            max_depth: plan.max_depth,
             seed: plan.seed,
             effects: plan.effects.names(),
             unsupported: plan.unsupported.names(),
-            trace: "none",
+            trace: rendered.trace.map_or("none", Trace::name),
             gpu_ms: passes.iter().map(|pass| pass.gpu_ms).sum(),
             passes,
             build_ms: BuildTimes {
                 scene: ms(run.load + rendered.upload),
-                acceleration: None,
+                acceleration: rendered.acceleration.map(ms),
                 pipelines: ms(rendered.pipelines),
             },
             wall_ms: ms(run.wall),
-            rays: None,
+            rays: rendered.tree.as_ref().map(|tree| tree.rays),
             peak_gpu_bytes: run.peak_gpu_bytes,
-            discarded: None,
+            discarded: rendered.tree.as_ref().map(|tree| DiscardedStats::new(&tree.discarded)),
             stderr: None,
             non_finite_pixels: rendered.radiance.len() - rendered.radiance.iter().filter(finite).count(),
             validation_messages: run.validation_messages,

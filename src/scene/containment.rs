@@ -4,13 +4,24 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::{Mesh, Object, Scene};
+use super::{Dielectric, Mesh, Object, Scene, Surface};
 
 impl Mesh {
     /// How often the surface winds around `point`, in the mesh's space: 1 inside of a closed mesh, 0 outside and in its
     /// cavities.
     pub fn winding_number(&self, point: DVec3) -> f64 {
         winding_number(&self.positions, &self.triangles, point)
+    }
+
+    /// What the surface encloses, in the mesh's space; of one that is not closed, a number without a meaning.
+    pub fn volume(&self) -> f64 {
+        let center = self.bounds().center();
+        let six = self.triangles.iter().map(|triangle| {
+            let [a, b, c] =
+                triangle.map(|index| DVec3::from_array(self.positions[index as usize].map(f64::from)) - center);
+            a.dot(b.cross(c))
+        });
+        six.sum::<f64>().abs() / 6.0
     }
 }
 
@@ -34,6 +45,44 @@ impl Scene {
         }
         let camera = object.transform.inverse().transform_point3(self.camera.position);
         !mesh.bounds().contains(camera) || mesh.winding_number(camera).abs() < 0.5
+    }
+
+    /// Which dielectric is there where several overlap: the one of the highest rank. Ranks count from 1, one a dielectric object;
+    /// what is no body, opaque or thin-walled, has 0.
+    ///
+    /// The higher priority wins; of one priority the smaller body, so that what lies in another shows; of one volume the later
+    /// object.
+    pub fn ranks(&self) -> Vec<u32> {
+        let volume =
+            |object: &Object| self.meshes[object.mesh].volume() * object.transform.matrix3.determinant().abs();
+        let mut bodies: Vec<(i32, f64, usize)> = (0..self.objects.len())
+            .filter_map(|number| {
+                let object = &self.objects[number];
+                match self.materials[object.material].surface {
+                    Surface::Dielectric(Dielectric { thin_walled: false, priority, .. }) => {
+                        Some((priority, volume(object), number))
+                    }
+                    _ => None,
+                }
+            })
+            .collect();
+        bodies.sort_by(|a, b| (a.0, b.1).partial_cmp(&(b.0, a.1)).unwrap_or(a.0.cmp(&b.0)).then(a.2.cmp(&b.2)));
+        let mut ranks = vec![0; self.objects.len()];
+        for (rank, (.., number)) in (1..).zip(bodies) {
+            ranks[number] = rank;
+        }
+        ranks
+    }
+
+    /// The objects that the camera is in: closed bodies that wind around it.
+    pub fn bodies_around_camera(&self) -> Vec<usize> {
+        (0..self.objects.len()).filter(|&number| self.camera_is_in(&self.objects[number])).collect()
+    }
+
+    fn camera_is_in(&self, object: &Object) -> bool {
+        matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled)
+            && self.meshes[object.mesh].faults.is_closed()
+            && !self.is_seen_from_outside(object)
     }
 }
 

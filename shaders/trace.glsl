@@ -1,0 +1,35 @@
+// The nearest surface on a ray's way: one interface, two ways to get there. A file that defines TRACE_HARDWARE before its includes
+// gets the device's ray queries, else a traversal written here. Both only say which triangle it is; where on it the
+// ray arrives, surface.glsl computes for both, so that both give the same picture.
+//
+//     bool Trace(vec3 origin, vec3 direction, out Found found)
+//
+// Space is the device's, see shared.glsl. What lies before the origin or on it is not found: rays that leave a surface start
+// beside it, see offset.glsl.
+#ifndef TRACE_GLSL
+#define TRACE_GLSL
+
+#include "constants.glsl"
+#include "shared.glsl"
+
+struct Found {
+    uint instance;
+    uint triangle;  // of the instance's mesh
+};
+
+layout(std430, set = 0, binding = 10) readonly buffer CornerBuffer { float corners[]; };
+
+// Corner 0, 1 or 2 of a triangle, counted through all meshes, in its mesh's space.
+vec3 FetchCorner(uint triangle, uint corner)
+{
+    uint first = 9 * triangle + 3 * corner;
+    return vec3(corners[first], corners[first + 1], corners[first + 2]);
+}
+
+#ifdef TRACE_HARDWARE
+#include "trace_hardware.glsl"
+#else
+#include "trace_software.glsl"
+#endif
+
+#endif

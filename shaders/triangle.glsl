@@ -1,0 +1,62 @@
+// Where a ray meets a triangle, watertight: Woop, Benthin & Wald, "Watertight Ray/Triangle Intersection", JCGT 2013.
+//
+// Seen along the ray a triangle's corners are points of a plane, the same for every triangle that shares them. Which side of an
+// edge the ray passes is the sign of a difference of two products. Rounding does not change the order of products: the
+// sign is right or 0, and with 0 as inside for the triangles on both sides no ray slips through an edge or a corner.
+#ifndef TRIANGLE_GLSL
+#define TRIANGLE_GLSL
+
+// A ray with its axes turned so that the largest part of its direction is z.
+struct ShearedRay {
+    vec3 origin;
+    vec3 shear;   // x and y per z, and 1 / z
+    int axis;     // which one became z
+};
+
+// x, y and z in a cyclic order, so that right-handed stays right-handed.
+vec3 Permute(vec3 v, int axis)
+{
+    return axis == 0 ? v.yzx : axis == 1 ? v.zxy : v;
+}
+
+ShearedRay ShearRay(vec3 origin, vec3 direction)
+{
+    vec3 size = abs(direction);
+    int axis = size.x > size.y && size.x > size.z ? 0 : size.y > size.z ? 1 : 2;
+    vec3 turned = Permute(direction, axis);
+    float inverse = 1.0 / turned.z;
+    return ShearedRay(origin, vec3(turned.xy * inverse, inverse), axis);
+}
+
+// A triangle met by a ray.
+struct Meeting {
+    float t;        // in lengths of the ray's direction
+    vec3 weights;   // of the corners, their sum is 1
+    bool behind;    // seen from the side where the corners are clockwise
+};
+
+// Whether the line of the ray, endless to both sides, passes through the triangle.
+bool MeetTriangle(ShearedRay ray, vec3 a, vec3 b, vec3 c, out Meeting meeting)
+{
+    a = Permute(a - ray.origin, ray.axis);
+    b = Permute(b - ray.origin, ray.axis);
+    c = Permute(c - ray.origin, ray.axis);
+    precise float ax = a.x - ray.shear.x * a.z;
+    precise float ay = a.y - ray.shear.y * a.z;
+    precise float bx = b.x - ray.shear.x * b.z;
+    precise float by = b.y - ray.shear.y * b.z;
+    precise float cx = c.x - ray.shear.x * c.z;
+    precise float cy = c.y - ray.shear.y * c.z;
+    precise float u = cx * by - cy * bx;
+    precise float v = ax * cy - ay * cx;
+    precise float w = bx * ay - by * ax;
+    if (min(min(u, v), w) < 0.0 && max(max(u, v), w) > 0.0) return false;
+    float determinant = u + v + w;
+    if (determinant == 0.0) return false;
+    meeting.weights = vec3(u, v, w) / determinant;
+    meeting.t = dot(meeting.weights, vec3(a.z, b.z, c.z)) * ray.shear.z;
+    meeting.behind = (determinant < 0.0) != (ray.shear.z < 0.0);
+    return true;
+}
+
+#endif
