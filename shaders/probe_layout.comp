@@ -38,10 +38,11 @@ void main()
     Put(frame.environmentLevels);
     Put(vec2(frame.environmentSize));
     Put(frame.maxDepth);
-    Put(frame.tolerance);
+    Put(frame.cutoff);
     Put(vec4(frame.cameraBodies));
     Put(frame.cameraIndex);
     Put(frame.cameraMedium);
+    Put(frame.tolerance);
     // The second of two, so that the size of the first counts too.
     Put(instances[1].objectToWorld);
     Put(instances[1].normalToWorld);

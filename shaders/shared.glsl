@@ -23,11 +23,12 @@ struct Frame {
     uint environmentLevels;    // of the environment's image: halves of halves below it
     uvec2 environmentSize;     // of its first level
     uint maxDepth;             // interfaces in a chain
-    float tolerance;           // throughput that a pixel may lose
+    float cutoff;              // throughput below which a branch is cut off
     uvec4 cameraBodies;        // ranks of the bodies that the camera is in, as in media.glsl
     float cameraIndex;         // of the medium around it
     uint cameraMedium;         // its material, from 1; 0: none
-    uvec2 padding;
+    float tolerance;           // throughput that a pixel may lose so
+    uint padding;
 };
 
 struct Instance {

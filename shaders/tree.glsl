@@ -32,12 +32,9 @@ struct Branch {
 // Branches that wait. Each has at least twice the throughput of the next.
 const int TREE_STACK = 16;
 
-// The share of what is left of a pixel's tolerance that one cut may take: the tolerance is never used up, and no large branch early
-// in the tree takes what many small ones need.
-const float CUT_SHARE = 0.125;
-
-// Throughput that no image shows, whatever the tolerance.
-const float LEAST_THROUGHPUT = 1e-12;
+// A tree that cut off more than it may is followed once more with a cut-off so many times smaller, down to what no image shows.
+const float CUTOFF_STEP = 8.0;
+const float LEAST_CUTOFF = 1e-9;
 
 // Nanometres, where no wavelength is told from the others.
 const float D_LINE = 587.6;
@@ -51,7 +48,7 @@ float Largest(vec3 v) { return max(max(v.x, v.y), v.z); }
 struct Gathered {
     vec3 radiance;
     float discarded;
-    float tolerance;   // what is left of it
+    float faint;       // the share of that which was cut off for its throughput
     uint interfaces;
     uint rays;
     bool dispersed;    // an index met on the way depends on the wavelength
@@ -68,12 +65,12 @@ void Discard(inout Gathered gathered, vec3 throughput, vec3 direction)
 }
 
 // Whether a child is too faint to be followed; then it is cut off.
-bool Cut(inout Gathered gathered, vec3 throughput, vec3 direction)
+bool Cut(inout Gathered gathered, float cutoff, vec3 throughput, vec3 direction)
 {
     float size = Largest(throughput);
     if (size == 0.0) return true;
-    if (size > max(CUT_SHARE * gathered.tolerance, LEAST_THROUGHPUT)) return false;
-    gathered.tolerance -= size;
+    if (size > cutoff) return false;
+    gathered.faint += size;
     Discard(gathered, throughput, direction);
     return true;
 }
@@ -127,12 +124,15 @@ Branch CameraBranch(vec2 pixel)
     return branch;
 }
 
-// Adds to `gathered` what the branch and everything that grows from it bring, at one wavelength.
-void FollowTree(inout Gathered gathered, Branch branch, float wavelength)
+// Gathers what the branch and everything that grows from it bring, at one wavelength; no more than `tolerance` of it is cut off for
+// being faint.
+void FollowTree(inout Gathered gathered, const Branch root, float wavelength, float tolerance)
 {
+    Branch branch = root;
     Branch waiting[TREE_STACK];
     int top = 0;
     uint passed = 0;
+    float cutoff = frame.cutoff;
     for (;;) {
         Found found;
         bool any = Trace(branch.origin, branch.direction, found);
@@ -203,8 +203,8 @@ void FollowTree(inout Gathered gathered, Branch branch, float wavelength)
                     gathered.radiance += reflected.throughput * EnvironmentTowards(wr) + refracted.throughput * EnvironmentTowards(wt);
                     reflected.throughput = refracted.throughput = vec3(0.0);
                 }
-                bool followsReflected = !Cut(gathered, reflected.throughput, reflected.direction);
-                bool followsRefracted = !Cut(gathered, refracted.throughput, refracted.direction);
+                bool followsReflected = !Cut(gathered, cutoff, reflected.throughput, reflected.direction);
+                bool followsRefracted = !Cut(gathered, cutoff, refracted.throughput, refracted.direction);
                 bool reflectedIsLarger = Largest(reflected.throughput) > Largest(refracted.throughput);
                 if (followsReflected && followsRefracted) {
                     if (top < TREE_STACK) {
@@ -224,9 +224,17 @@ void FollowTree(inout Gathered gathered, Branch branch, float wavelength)
             }
         }
         if (goesOn) continue;
+        passed = 0;
+        if (gathered.faint > tolerance && cutoff > LEAST_CUTOFF) {
+            cutoff /= CUTOFF_STEP;
+            gathered.radiance = vec3(0.0);
+            gathered.discarded = gathered.faint = 0.0;
+            branch = root;
+            top = 0;
+            continue;
+        }
         if (top == 0) break;
         branch = waiting[--top];
-        passed = 0;
     }
 }
 
@@ -235,9 +243,9 @@ void main()
     uvec2 pixel = uvec2(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y + firstRow);
     if (any(greaterThanEqual(pixel, uvec2(imageSize(mean))))) return;
     Branch camera = CameraBranch(vec2(pixel) + 0.5 + jitter);
-    Gathered gathered = Gathered(vec3(0.0), 0.0, frame.tolerance, 0, 0, false);
+    Gathered gathered = Gathered(vec3(0.0), 0.0, 0.0, 0, 0, false);
     if (!DISPERSION) {
-        FollowTree(gathered, camera, D_LINE);
+        FollowTree(gathered, camera, D_LINE, frame.tolerance);
     } else {
         // Each wavelength has a tree of its own, up to the first one that no index tells from the others.
         vec3 radiance = vec3(0.0);
@@ -246,9 +254,8 @@ void main()
         for (uint i = 0; i < wavelengths; ++i) shares += max(spectrum[i].rgb, 0.0);
         for (uint i = 0; i < wavelengths; ++i) {
             gathered.radiance = vec3(0.0);
-            gathered.discarded = 0.0;
-            gathered.tolerance = frame.tolerance / Largest(shares);
-            FollowTree(gathered, camera, spectrum[i].w);
+            gathered.discarded = gathered.faint = 0.0;
+            FollowTree(gathered, camera, spectrum[i].w, frame.tolerance / Largest(shares));
             vec3 weight = gathered.dispersed ? spectrum[i].rgb : vec3(1.0);
             radiance += weight * gathered.radiance;
             discarded += weight * gathered.discarded;

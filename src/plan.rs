@@ -19,7 +19,9 @@ pub struct Plan {
     pub budget: Budget,
     /// Longest chain of interfaces; `None` in models that do not follow one.
     pub max_depth: Option<u32>,
-    /// Throughput that a pixel may lose to cuts.
+    /// Throughput below which a branch is cut off.
+    pub cutoff: f64,
+    /// Throughput that a pixel may lose so; infinite: any.
     pub tolerance: f64,
     /// How rays are traced, where the user has a wish.
     pub trace: Option<Trace>,
@@ -78,8 +80,8 @@ const DEPTH: u32 = 32;
 /// The same where a tolerance is asked for: long enough that few pixels miss it, short enough to end.
 const DEPTH_OF_TOLERANCE: u32 = 1024;
 
-/// Throughput that a pixel of `tree` may lose to cuts, where the user has no wish.
-const TOLERANCE: f64 = 0.01;
+/// Throughput below which `tree` cuts a branch off, where no tolerance is asked for.
+const CUTOFF: f64 = 0.005;
 
 /// Visible normals that one sample takes, at least and at most.
 const NORMALS_A_SAMPLE: RangeInclusive<u32> = 8..=16;
@@ -146,7 +148,8 @@ impl Plan {
             size,
             budget,
             max_depth,
-            tolerance: args.tolerance.unwrap_or(TOLERANCE),
+            cutoff: args.tolerance.map_or(CUTOFF, |tolerance| tolerance / 4.0),
+            tolerance: args.tolerance.unwrap_or(f64::INFINITY),
             trace: args.trace,
             seed: args.seed.unwrap_or(0),
             effects: share(true),

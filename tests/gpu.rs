@@ -73,10 +73,11 @@ impl Records {
                 environment_levels: n.next() as u32,
                 environment_size: [n.next() as u32, n.next() as u32],
                 max_depth: n.next() as u32,
-                tolerance: n.next(),
+                cutoff: n.next(),
                 camera_bodies: std::array::from_fn(|_| n.next() as u32),
                 camera_index: n.next(),
                 camera_medium: n.next() as u32,
+                tolerance: n.next(),
                 ..Frame::zeroed()
             },
             instance: InstanceRecord {

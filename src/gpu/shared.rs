@@ -46,11 +46,12 @@ pub struct Frame {
     pub environment_levels: u32,
     pub environment_size: [u32; 2],
     pub max_depth: u32,
-    pub tolerance: f32,
+    pub cutoff: f32,
     pub camera_bodies: [u32; 4],
     pub camera_index: f32,
     pub camera_medium: u32,
-    pub padding: [u32; 2],
+    pub tolerance: f32,
+    pub padding: u32,
 }
 
 impl Frame {

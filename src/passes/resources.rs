@@ -226,6 +226,7 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
             Budget::Seconds { .. } => 0,
         },
         max_depth: plan.max_depth.unwrap_or(1),
+        cutoff: plan.cutoff as f32,
         tolerance: plan.tolerance as f32,
         camera_bodies: if nests { camera_bodies(scene) } else { [0; 4] },
         camera_index: medium.map_or(1.0, |medium| index(&scene.materials[medium])),
