@@ -257,6 +257,8 @@ fn check(scene: &Scene) {
         assert!(mesh.normals.is_empty() || mesh.normals.len() == mesh.positions.len());
         let unit = |[x, y, z]: &[f32; 3]| (x * x + y * y + z * z - 1.0).abs() < 1e-5;
         assert!(mesh.normals.iter().all(unit));
+        assert!(mesh.uvs.is_empty() || mesh.uvs.len() == mesh.positions.len());
+        assert!(mesh.uvs.iter().flatten().all(|x| x.is_finite()));
         assert!(mesh.triangles.iter().flatten().all(|&vertex| (vertex as usize) < mesh.positions.len()));
     }
     for object in &scene.objects {

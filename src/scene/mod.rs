@@ -28,7 +28,7 @@ pub use bounds::Bounds;
 pub use camera::Camera;
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
 pub use material::{Dielectric, GLASSES, Glass, Material, Opaque, Surface};
-pub use mesh::{Mesh, MeshFaults, Refusal};
+pub use mesh::{Mesh, MeshFaults, RawMesh, Refusal};
 
 use crate::options::RenderArgs;
 use crate::{Error, Result};

@@ -1,15 +1,15 @@
 //! Wavefront OBJ. In flow the bytes of an `.obj` and of the `.mtl` it names, out flow parts: a mesh and what it wears.
 //!
 //! A part is what an `o` line opens, cut where the material changes; groups (`g`) cut nothing, because a piece of a
-//! closed surface bounds no medium. Polygons are cut as fans. Points, lines, free-form geometry and texture
-//! coordinates are left out. [`super::obj_text`] tidies the text, then `tobj` reads it.
+//! closed surface bounds no medium. Polygons are cut as fans. Points, lines and free-form geometry are left out.
+//! [`super::obj_text`] tidies the text, then `tobj` reads it.
 
 use std::collections::HashMap;
 use std::path::Path;
 
 use super::files::Files;
 use super::material::Material;
-use super::mesh::{Mesh, Refusal};
+use super::mesh::{Mesh, RawMesh, Refusal};
 use super::mtl;
 use super::obj_text::{Tidy, bad_number};
 use crate::{Error, Result};
@@ -70,15 +70,6 @@ pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
     Ok(ObjFile { parts, materials, warnings, material_warnings })
 }
 
-#[derive(Default)]
-struct RawPart {
-    name: String,
-    material: Option<usize>,
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
-}
-
 /// Joins the models that tobj cut a part into, and checks each part.
 fn parts(
     path: &Path,
@@ -87,17 +78,18 @@ fn parts(
     models: Vec<tobj::Model>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Part>> {
-    let mut raw: Vec<RawPart> = Vec::new();
+    let mut raw: Vec<(RawMesh, Option<usize>)> = Vec::new();
     let mut numbers = HashMap::new();
     for tobj::Model { mesh, name } in models {
         let number = *numbers.entry((name.clone(), mesh.material_id)).or_insert_with(|| {
-            raw.push(RawPart { name, material: mesh.material_id, ..RawPart::default() });
+            raw.push((RawMesh { name, ..RawMesh::default() }, mesh.material_id));
             raw.len() - 1
         });
-        let part = &mut raw[number];
+        let (part, _) = &mut raw[number];
         let offset = part.positions.len() as u32;
         part.positions.extend(mesh.positions.as_chunks().0);
         part.normals.extend(mesh.normals.as_chunks().0);
+        part.uvs.extend(mesh.texcoords.as_chunks().0);
         let triangles = mesh.indices.as_chunks().0.iter();
         part.triangles.extend(triangles.map(|triangle| triangle.map(|vertex| vertex + offset)));
     }
@@ -105,9 +97,9 @@ fn parts(
     let before = warnings.len();
     let mut parts = Vec::new();
     let mut lost = 0;
-    for RawPart { name, material, positions, normals, triangles } in raw {
-        let name = if several { format!("{file} ({name})") } else { file.to_owned() };
-        match Mesh::new(name, positions, normals, triangles) {
+    for (mut part, material) in raw {
+        part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
+        match Mesh::new(part) {
             Ok(mesh) => {
                 if !mesh.faults.is_empty() {
                     warnings.push(format!("{}: {}", mesh.name, mesh.faults));
