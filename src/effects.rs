@@ -251,7 +251,7 @@ impl fmt::Display for Selection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Overrides;
+    use crate::scene::{Opaque, Overrides};
 
     fn built_in() -> Scene {
         Scene::load(None, &Overrides::default()).expect("the built-in scene")
@@ -311,7 +311,8 @@ mod tests {
             (glass(|g| (g.attenuation_distance, g.attenuation_color.x) = (1.0, 0.5)), "absorption"),
             (glass(|g| g.dispersion = 0.1), "dispersion"),
             (glass(|g| g.thin_walled = true), "thin-walled"),
-            (Surface::Opaque(crate::scene::Opaque::default()), "opaque"),
+            (Surface::Opaque(Opaque::default()), "opaque"),
+            (Surface::Opaque(Opaque { base_color_texture: Some(0), ..Opaque::default() }), "textures"),
         ] {
             scene.materials[0].surface = surface;
             assert!(calls(&scene).contains(&expected), "{expected}");

@@ -75,7 +75,8 @@ pub fn read(files: Files, path: &Path) -> Result<SceneFile> {
     let mut assembly = Assembly::default();
     if let Some(materials) = root.get("material") {
         for entry in materials.any_table("material.NAME")?.entries() {
-            assembly.materials.push(Material { name: entry.key.to_owned(), surface: reader.surface(entry)? });
+            let surface = reader.surface(entry, &mut assembly)?;
+            assembly.materials.push(Material { name: entry.key.to_owned(), surface });
         }
     }
     let objects = root.or("object", Vec::new(), |objects| {
@@ -194,7 +195,7 @@ impl Reader<'_> {
         Ok(text.into())
     }
 
-    fn surface(&self, entry: Entry<'_>) -> Result<Surface> {
+    fn surface(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<Surface> {
         let name = format!("material.{}", entry.key);
         let table = entry.any_table(&name)?;
         let Some(kind) = table.get("kind") else {
@@ -202,11 +203,11 @@ impl Reader<'_> {
         };
         match kind.choice(&[("dielectric", Kind::Dielectric), ("opaque", Kind::Opaque)])? {
             Kind::Dielectric => dielectric(&entry.table(&name, &DIELECTRIC_KEYS)?),
-            Kind::Opaque => self.opaque(&entry.table(&name, &OPAQUE_KEYS)?),
+            Kind::Opaque => self.opaque(&entry.table(&name, &OPAQUE_KEYS)?, assembly),
         }
     }
 
-    fn opaque(&self, table: &Table<'_>) -> Result<Surface> {
+    fn opaque(&self, table: &Table<'_>, assembly: &mut Assembly) -> Result<Surface> {
         let plain = Opaque::default();
         let texture = table.get("base_color_texture");
         if let (Some(texture), Some(_)) = (texture, table.get("base_color")) {
@@ -214,12 +215,17 @@ impl Reader<'_> {
         }
         Ok(Surface::Opaque(Opaque {
             base_color: table.or("base_color", plain.base_color, |entry| entry.triple(&UNIT))?,
-            base_color_texture: texture.map(|entry| self.path(entry)).transpose()?,
+            base_color_texture: texture.map(|entry| self.texture(entry, assembly)).transpose()?,
             metallic: table.or("metallic", plain.metallic, |entry| entry.number(&UNIT))?,
             roughness: table.or("roughness", plain.roughness, |entry| entry.number(&UNIT))?,
             specular: table.or("specular", plain.specular, |entry| entry.number(&UNIT))?,
             emission: table.or("emission", plain.emission, |entry| entry.triple(&LIGHT))?,
         }))
+    }
+
+    fn texture(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<usize> {
+        let texture = assembly.textures.open(self.files, &self.path(entry)?, &mut assembly.warnings);
+        texture.map_err(|error| entry.error(format!("{}: {}", entry.key, error.in_full())))
     }
 
     fn object<'a>(&self, entry: Entry<'a>, number: usize, materials: &[Material]) -> Result<ObjectTable<'a>> {

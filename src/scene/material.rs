@@ -1,7 +1,5 @@
 //! Materials: what flows in are the numbers of a scene file or an MTL, what flows out is one [`Surface`] a material.
 
-use std::path::PathBuf;
-
 use glam::DVec3;
 
 /// A surface with a name.
@@ -61,8 +59,8 @@ impl Default for Dielectric {
 pub struct Opaque {
     /// Reflectance, 0 to 1.
     pub base_color: DVec3,
-    /// An image in the place of [`Opaque::base_color`].
-    pub base_color_texture: Option<PathBuf>,
+    /// An image in the place of [`Opaque::base_color`]: index into [`super::Scene::textures`].
+    pub base_color_texture: Option<usize>,
     /// 0: dielectric below, 1: metal.
     pub metallic: f64,
     /// Perceptual roughness, 0 to 1; the alpha of GGX is its square.

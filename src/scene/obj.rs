@@ -5,7 +5,7 @@
 //! [`super::obj_text`] tidies the text, then `tobj` reads it.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::files::Files;
 use super::material::Material;
@@ -19,8 +19,10 @@ use crate::{Error, Result};
 pub struct ObjFile {
     /// Meshes with indices into [`ObjFile::materials`].
     pub parts: Vec<Part>,
-    /// The materials of the MTL files.
+    /// The materials of the MTL files that parts wear; their textures are indices into [`ObjFile::images`].
     pub materials: Vec<Material>,
+    /// The images that they name, not opened yet.
+    pub images: Vec<PathBuf>,
     /// What is wrong with the meshes, one line each.
     pub warnings: Vec<String>,
     /// What is wrong with the materials, which matters only to those who use them.
@@ -46,7 +48,8 @@ pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
     let tidy = Tidy::new(&text).map_err(|(line, message)| Error::input(path, line, message))?;
 
     let mut material_warnings = Vec::new();
-    let materials = mtl::read_all(files, path, &tidy.libraries, &mut material_warnings);
+    let mut images = Vec::new();
+    let materials = mtl::read_all(files, path, &tidy.libraries, &mut images, &mut material_warnings);
     // As in an MTL file, the last one of a name counts.
     let numbers: HashMap<&str, usize> = materials.iter().enumerate().map(|(i, m)| (m.name.as_str(), i)).collect();
     let before = material_warnings.len();
@@ -66,8 +69,9 @@ pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
     })?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let mut warnings: Vec<_> = tidy.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
-    let parts = parts(path, &file, &text, models, &mut warnings)?;
-    Ok(ObjFile { parts, materials, warnings, material_warnings })
+    let mut parts = parts(path, &file, &text, models, &mut warnings)?;
+    let materials = worn(&mut parts, materials);
+    Ok(ObjFile { parts, materials, images, warnings, material_warnings })
 }
 
 /// Joins the models that tobj cut a part into, and checks each part.
@@ -121,6 +125,21 @@ fn parts(
         warnings.push(format!("{file}: {lost} degenerate triangles removed, and the parts that held nothing else"));
     }
     Ok(parts)
+}
+
+/// The materials that parts wear: a library may hold many more, and their images.
+fn worn(parts: &mut [Part], materials: Vec<Material>) -> Vec<Material> {
+    let mut numbers = vec![None; materials.len()];
+    let mut count = 0;
+    for number in parts.iter_mut().filter_map(|part| part.material.as_mut()) {
+        *number = *numbers[*number].get_or_insert_with(|| {
+            count += 1;
+            count - 1
+        });
+    }
+    let mut worn: Vec<_> = numbers.into_iter().zip(materials).filter_map(|(number, m)| Some((number?, m))).collect();
+    worn.sort_by_key(|(number, _)| *number);
+    worn.into_iter().map(|(_, material)| material).collect()
 }
 
 /// Keeps the first of the remarks from `start` on, and says how many more of `what` there are.

@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::DVec3;
-use vitrum::scene::{Dielectric, Opaque, Surface};
+use vitrum::scene::{Dielectric, Opaque, Scene, Surface};
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
@@ -159,10 +159,17 @@ fn polygons_groups_and_materials_become_triangles_and_parts() {
 
 /// What the MTL with these lines makes of a body, and what is said about it.
 fn from_mtl(folder: &Folder, lines: &str) -> (Surface, Vec<String>) {
-    folder.write("m.mtl", format!("newmtl m\n{lines}\n"));
-    folder.write("mtl.obj", format!("mtllib m.mtl\nusemtl m\n{TETRAHEDRON}"));
-    let scene = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"mtl.obj\"\n").unwrap();
+    let scene = with_mtl(folder, lines);
     (scene.materials[scene.objects[0].material].surface.clone(), scene.warnings)
+}
+
+fn with_mtl(folder: &Folder, lines: &str) -> Scene {
+    folder.write("m.mtl", format!("newmtl m\n{lines}\n"));
+    let body = TETRAHEDRON.replace("f 1 ", "f 1/1 ");
+    folder.write("mtl.obj", format!("mtllib m.mtl\nusemtl m\nvt 0 0\n{body}"));
+    let mut scene = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"mtl.obj\"\n").unwrap();
+    scene.warnings.retain(|warning| !warning.contains("texture coordinates"));
+    scene
 }
 
 #[test]
@@ -206,18 +213,17 @@ fn mtl_values_are_converted_or_remarked_on() {
 
     fs::create_dir(folder.path("tex")).unwrap();
     fs::copy(folder.path("sky.png"), folder.path("tex/my sky.png")).unwrap();
-    let (surface, warnings) =
-        from_mtl(&folder, "Kd 0.5\nPm 1\nPr 0.25\nKe 1 2 3\nmap_Kd -s 1 1 1 -clamp on tex\\my sky.png");
-    let texture = folder.0.path().join("tex/my sky.png");
+    let scene = with_mtl(&folder, "Kd 0.5\nPm 1\nPr 0.25\nKe 1 2 3\nmap_Kd -s 1 1 1 -clamp on tex\\my sky.png");
+    assert_eq!(scene.textures[0].path, folder.path("tex/my sky.png"));
     let expected = Opaque {
         base_color: DVec3::splat(0.5),
-        base_color_texture: Some(texture),
+        base_color_texture: Some(0),
         metallic: 1.0,
         roughness: 0.25,
         specular: 1.0,
         emission: DVec3::new(1.0, 2.0, 3.0),
     };
-    assert_eq!((surface, warnings.len()), (Surface::Opaque(expected), 0));
+    assert_eq!((opaque(&scene, 0), scene.warnings.len()), (&expected, 0));
 
     let (surface, warnings) = from_mtl(&folder, "Kd 0 1 0\nmap_Kd none.png");
     assert!(
