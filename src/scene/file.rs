@@ -13,7 +13,7 @@ use super::files::Files;
 use super::material::Glass;
 use super::mesh::FARTHEST;
 use super::table::{Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT};
-use super::{Camera, Dielectric, Material, Opaque, PointLight, Surface, builtin};
+use super::{Camera, Dielectric, Dispersion, Material, Opaque, PointLight, Surface, builtin};
 use crate::options::RenderArgs;
 use crate::{Error, Result};
 
@@ -267,14 +267,23 @@ impl ObjectTable<'_> {
 
 fn dielectric(table: &Table<'_>) -> Result<Surface> {
     let clear = Dielectric::default();
-    let ior = |entry: Entry<'_>| match entry.as_text() {
-        Some(name) => Glass::named(name).map(|glass| glass.ior).map_err(|message| entry.error(message)),
-        None => entry.number(&INDEX),
+    // A glass brings its dispersion along.
+    let index = |entry: Entry<'_>| match entry.as_text() {
+        Some(name) => match Glass::named(name) {
+            Ok(glass) => Ok((glass.ior, glass.dispersion)),
+            Err(message) => Err(entry.error(message)),
+        },
+        None => Ok((entry.number(&INDEX)?, Dispersion::None)),
+    };
+    let (ior, own) = table.or("ior", (clear.ior, clear.dispersion), index)?;
+    let dispersion = |entry: Entry<'_>| match entry.number(&LIGHT)? {
+        0.0 => Ok(Dispersion::None),
+        number => Ok(Dispersion::Khr(number)),
     };
     Ok(Surface::Dielectric(Dielectric {
-        ior: table.or("ior", clear.ior, ior)?,
+        ior,
         roughness: table.or("roughness", clear.roughness, |entry| entry.number(&UNIT))?,
-        dispersion: table.or("dispersion", clear.dispersion, |entry| entry.number(&LIGHT))?,
+        dispersion: table.or("dispersion", own, dispersion)?,
         attenuation_color: table.or("attenuation_color", clear.attenuation_color, |entry| entry.triple(&UNIT))?,
         attenuation_distance: table
             .or("attenuation_distance", clear.attenuation_distance, |entry| entry.number(&POSITIVE_OR_INFINITE))?,

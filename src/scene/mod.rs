@@ -29,7 +29,7 @@ use glam::{DAffine3, DVec3};
 pub use bounds::Bounds;
 pub use camera::Camera;
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
-pub use material::{Dielectric, GLASSES, Glass, Material, Opaque, Surface};
+pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
 pub use mesh::{Mesh, MeshFaults, RawMesh, Refusal};
 pub use texture::{Texels, Texture};
 
@@ -95,7 +95,7 @@ pub struct Object {
 /// What a command line puts in the place of what a scene says.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
-    /// Index of every dielectric.
+    /// Index of every dielectric, in the place of that of a glass and its dispersion.
     pub ior: Option<f64>,
     /// Roughness of every dielectric.
     pub roughness: Option<f64>,
@@ -140,7 +140,9 @@ impl Scene {
         warn_of_missing_uvs(&objects, &meshes, &materials, &textures, &mut warnings);
         for material in &mut materials {
             if let Surface::Dielectric(dielectric) = &mut material.surface {
-                dielectric.ior = overrides.ior.unwrap_or(dielectric.ior);
+                if let Some(ior) = overrides.ior {
+                    dielectric.set_ior(ior);
+                }
                 dielectric.roughness = overrides.roughness.unwrap_or(dielectric.roughness);
             }
         }
