@@ -71,7 +71,7 @@ const TABLE: [Row; 13] = {
         row(Roughness, "roughness", &[Single], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
         row(EnergyCompensation, "energy-compensation", &[Single], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
         row(Absorption, "absorption", TRACED, |s| any_dielectric(s, absorbs)),
-        row(Dispersion, "dispersion", TRACED, |s| any_dielectric(s, |d| d.dispersion > 0.0)),
+        row(Dispersion, "dispersion", TRACED, |s| any_dielectric(s, disperses)),
         row(Nesting, "nesting", TRACED, nests),
         row(ThinWalled, "thin-walled", TRACED, |s| any_dielectric(s, |d| d.thin_walled)),
         row(Opaque, "opaque", TRACED, |s| surfaces(s).any(|x| matches!(x, Surface::Opaque(_)))),
@@ -94,8 +94,15 @@ fn has_light(scene: &Scene) -> bool {
     !scene.objects.is_empty() && scene.lights.iter().any(|light| light.intensity.max_element() > 0.0)
 }
 
+/// A pane has no inside that could.
 fn absorbs(dielectric: &Dielectric) -> bool {
-    dielectric.attenuation_distance.is_finite() && dielectric.attenuation_color.min_element() < 1.0
+    let colored = dielectric.attenuation_distance.is_finite() && dielectric.attenuation_color.min_element() < 1.0;
+    colored && !dielectric.thin_walled
+}
+
+/// Light leaves a pane as it came, each colour in the same direction.
+fn disperses(dielectric: &Dielectric) -> bool {
+    dielectric.disperses() && !dielectric.thin_walled
 }
 
 /// Bounding boxes that meet may hold bodies that meet, and a camera in one may be inside the body.
@@ -253,7 +260,7 @@ impl fmt::Display for Selection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::Overrides;
+    use crate::scene::{Dispersion, Glass, Opaque, Overrides};
 
     fn built_in() -> Scene {
         Scene::load(None, &Overrides::default()).expect("the built-in scene")
@@ -311,12 +318,26 @@ mod tests {
             (glass(|g| g.roughness = 0.02), "roughness"),
             (glass(|g| g.roughness = 0.02), "energy-compensation"),
             (glass(|g| (g.attenuation_distance, g.attenuation_color.x) = (1.0, 0.5)), "absorption"),
-            (glass(|g| g.dispersion = 0.1), "dispersion"),
+            (glass(|g| g.dispersion = Dispersion::Khr(0.1)), "dispersion"),
+            (glass(|g| g.dispersion = Glass::named("bk7").expect("a glass").dispersion), "dispersion"),
             (glass(|g| g.thin_walled = true), "thin-walled"),
-            (Surface::Opaque(crate::scene::Opaque::default()), "opaque"),
+            (Surface::Opaque(Opaque::default()), "opaque"),
+            (Surface::Opaque(Opaque { base_color_texture: Some(0), ..Opaque::default() }), "textures"),
         ] {
             scene.materials[0].surface = surface;
             assert!(calls(&scene).contains(&expected), "{expected}");
+        }
+        // A pane has no inside, and an index of 1 nothing to disperse with.
+        for (surface, unexpected) in [
+            (glass(|g| (g.dispersion, g.thin_walled) = (Dispersion::Khr(0.1), true)), "dispersion"),
+            (glass(|g| (g.dispersion, g.ior) = (Dispersion::Khr(0.1), 1.0)), "dispersion"),
+            (
+                glass(|g| (g.attenuation_distance, g.attenuation_color.x, g.thin_walled) = (1.0, 0.5, true)),
+                "absorption",
+            ),
+        ] {
+            scene.materials[0].surface = surface;
+            assert!(!calls(&scene).contains(&unexpected), "{unexpected}");
         }
         scene.objects.clear();
         assert!(calls(&scene).is_empty());

@@ -55,6 +55,17 @@ impl Error {
         Self::File { path: path.as_ref().into(), action, source }
     }
 
+    /// This error and what caused it in one line, for messages that go on.
+    pub fn in_full(&self) -> String {
+        let mut text = self.to_string();
+        let mut source = std::error::Error::source(self);
+        while let Some(cause) = source {
+            text.push_str(&format!(": {cause}"));
+            source = cause.source();
+        }
+        text
+    }
+
     /// The exit code of the binary: 1 failed check, 2 bad usage or input, 3 no usable device.
     pub fn exit_code(&self) -> u8 {
         match self {

@@ -10,7 +10,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use vitrum::scene::{Overrides, Scene};
+use vitrum::scene::{Overrides, Scene, Surface, Texels, Texture};
 
 /// The longest that one case may take.
 const SLOWEST: Duration = Duration::from_secs(2);
@@ -226,6 +226,7 @@ impl Folder {
         files.write("fuzz.obj", OBJ.as_bytes());
         files.write("fuzz.mtl", MTL.as_bytes());
         files.write("scene.toml", SHOW.as_bytes());
+        image::RgbImage::from_pixel(2, 1, image::Rgb([255, 0, 188])).save(files.folder.path().join("tex.png")).unwrap();
         files
     }
 
@@ -257,7 +258,21 @@ fn check(scene: &Scene) {
         assert!(mesh.normals.is_empty() || mesh.normals.len() == mesh.positions.len());
         let unit = |[x, y, z]: &[f32; 3]| (x * x + y * y + z * z - 1.0).abs() < 1e-5;
         assert!(mesh.normals.iter().all(unit));
+        assert!(mesh.uvs.is_empty() || mesh.uvs.len() == mesh.positions.len());
+        assert!(mesh.uvs.iter().flatten().all(|x| x.is_finite()));
         assert!(mesh.triangles.iter().flatten().all(|&vertex| (vertex as usize) < mesh.positions.len()));
+    }
+    for material in &scene.materials {
+        if let Surface::Opaque(opaque) = &material.surface {
+            assert!(opaque.base_color_texture.is_none_or(|texture| texture < scene.textures.len()));
+        }
+    }
+    for Texture { width, height, texels, .. } in &scene.textures {
+        let count = match texels {
+            Texels::Srgb(texels) => texels.len(),
+            Texels::Linear(texels) => texels.len(),
+        };
+        assert_eq!(count, *width as usize * *height as usize);
     }
     for object in &scene.objects {
         assert!(object.mesh < scene.meshes.len() && object.material < scene.materials.len());
@@ -337,10 +352,11 @@ fn generated_scene(random: &mut Random) -> String {
         for _ in 0..repeat {
             text += &format!("{header}\n");
             for key in keys {
-                // What is required is rarely left out, a file that does not exist rarely named.
+                // What is required is rarely left out; a file that does not exist is rarely named, nor a texture, which
+                // must not stand beside a colour.
                 let required = ["kind", "mesh", "position", "target", "color"].contains(key);
-                let broken = ["image", "base_color_texture"].contains(key);
-                if random.one_in(if required { 40 } else { 3 }) || broken && !random.one_in(40) {
+                let rare = ["image", "base_color_texture"].contains(key);
+                if random.one_in(if required { 40 } else { 3 }) || rare && !random.one_in(40) {
                     continue;
                 }
                 text += &format!(
@@ -378,7 +394,8 @@ fn fitting(random: &mut Random, key: &str, header: &str) -> String {
         "scale" if random.one_in(2) => "-2".into(),
         "position" | "target" | "up" | "color" | "base_color" | "emission" | "attenuation_color" | "translate"
         | "rotate" | "scale" => format!("[{}, {}, {}]", number(random), number(random), number(random)),
-        "image" | "base_color_texture" => "\"none.png\"".into(),
+        "image" => "\"none.png\"".into(),
+        "base_color_texture" => "\"tex.png\"".into(),
         _ => number(random),
     }
 }

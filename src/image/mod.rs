@@ -9,7 +9,7 @@ mod read;
 pub use self::exr::encode as encode_exr;
 pub use output::{ImageFormat, OutputFile};
 pub use png::encode as encode_png;
-pub use read::{KNOWN_FORMATS, LARGEST_SIDE, decode};
+pub use read::{KNOWN_FORMATS, LARGEST_SIDE, Stored, decode, decode_stored};
 
 /// Scene-linear radiance and whatever else is known about each pixel; row 0 is the top row.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -26,9 +26,45 @@ const ALWAYS_FINE: usize = 64 << 20;
 #[derive(Debug)]
 pub struct Unreadable(pub String);
 
+/// Pixels as a file stores them.
+#[derive(Clone, Debug)]
+pub enum Stored {
+    /// 8 bits a channel, encoded as sRGB.
+    Srgb {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// Red, green and blue, row by row from the top.
+        pixels: Vec<[u8; 3]>,
+    },
+    /// Anything else: linear.
+    Linear(FloatImage),
+}
+
+impl Stored {
+    /// The same pixels, linear.
+    pub fn into_linear(self) -> FloatImage {
+        match self {
+            Self::Linear(image) => image,
+            Self::Srgb { width, height, pixels } => {
+                // Up to 8 bits a table is exact and fast.
+                let table: Vec<f32> = (0..=255u8).map(|code| from_srgb(f64::from(code) / 255.0)).collect();
+                let pixels = pixels.into_iter().map(|pixel| pixel.map(|code| table[usize::from(code)])).collect();
+                FloatImage { width, height, pixels, layers: Vec::new() }
+            }
+        }
+    }
+}
+
 /// The pixels of the file at `path`, whose content is `bytes`: linear, sRGB files decoded. The content decides what it
 /// is, the extension where the content is no help.
 pub fn decode(path: &Path, bytes: &[u8]) -> Result<FloatImage> {
+    decode_stored(path, bytes).map(Stored::into_linear)
+}
+
+/// As [`decode`], but images of 8 bits a channel are left as they are.
+pub fn decode_stored(path: &Path, bytes: &[u8]) -> Result<Stored> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     let kind = kind_of(bytes).or(match extension.as_deref() {
         Some("exr") => Some(Kind::Exr),
@@ -38,7 +74,7 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<FloatImage> {
         _ => None,
     });
     let decoded = match kind {
-        Some(Kind::Exr) => exr::decode(bytes),
+        Some(Kind::Exr) => exr::decode(bytes).map(Stored::Linear),
         Some(Kind::Other(format)) => decode_other(format, bytes),
         None => Err(Unreadable(format!("is no image of a known kind; known: {KNOWN_FORMATS}"))),
     };
@@ -86,7 +122,7 @@ pub fn check_size(width: usize, height: usize, bytes_per_pixel: usize, file: usi
     Ok(())
 }
 
-fn decode_other(format: Format, bytes: &[u8]) -> Result<FloatImage, Unreadable> {
+fn decode_other(format: Format, bytes: &[u8]) -> Result<Stored, Unreadable> {
     let wrong = |error: image::ImageError| Unreadable(error.to_string());
     let decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().map_err(wrong)?;
     let (width, height) = decoder.dimensions();
@@ -95,13 +131,12 @@ fn decode_other(format: Format, bytes: &[u8]) -> Result<FloatImage, Unreadable> 
     let linear = matches!(format, Format::Hdr);
     let pixels = match decoded {
         image::DynamicImage::ImageRgb32F(pixels) => pixels.pixels().map(|pixel| pixel.0).collect(),
-        // Up to 8 bits a table is exact and fast; 16 bits are decoded one by one.
         image::DynamicImage::ImageLuma8(_)
         | image::DynamicImage::ImageLumaA8(_)
         | image::DynamicImage::ImageRgb8(_)
         | image::DynamicImage::ImageRgba8(_) => {
-            let table: Vec<f32> = (0..=255u8).map(|code| from_srgb(f64::from(code) / 255.0)).collect();
-            decoded.into_rgb8().pixels().map(|pixel| pixel.0.map(|code| table[usize::from(code)])).collect()
+            let pixels = decoded.into_rgb8().into_raw().as_chunks().0.to_vec();
+            return Ok(Stored::Srgb { width, height, pixels });
         }
         other if linear => other.into_rgb32f().pixels().map(|pixel| pixel.0).collect(),
         other => {
@@ -109,7 +144,7 @@ fn decode_other(format: Format, bytes: &[u8]) -> Result<FloatImage, Unreadable> 
             other.into_rgb16().pixels().map(|pixel| pixel.0.map(decode)).collect()
         }
     };
-    Ok(FloatImage { width, height, pixels, layers: Vec::new() })
+    Ok(Stored::Linear(FloatImage { width, height, pixels, layers: Vec::new() }))
 }
 
 /// IEC 61966-2-1, display value to linear.

@@ -1,5 +1,5 @@
 //! Puts meshes in their places. In flow mesh files and where they stand, out flow meshes, objects and the materials
-//! that the files bring along; a file is read once, however many objects show it.
+//! and textures that the files bring along; a file is read once, however many objects show it.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -9,15 +9,17 @@ use glam::DAffine3;
 
 use super::files::Files;
 use super::obj::{self, ObjFile};
-use super::{Bounds, Material, Mesh, Object};
+use super::texture::Textures;
+use super::{Bounds, Material, Mesh, Object, Surface};
 use crate::Result;
 
-/// Meshes, objects and materials so far.
+/// Meshes, objects, materials and textures so far.
 #[derive(Debug, Default)]
 pub struct Assembly {
     pub meshes: Vec<Mesh>,
     pub objects: Vec<Object>,
     pub materials: Vec<Material>,
+    pub textures: Textures,
     pub warnings: Vec<String>,
     read: HashMap<PathBuf, MeshFile>,
     clear_glass: Option<usize>,
@@ -28,7 +30,9 @@ pub struct Assembly {
 struct MeshFile {
     /// Index of the mesh and, within the file, of its material.
     parts: Vec<(usize, Option<usize>)>,
+    /// With indices into `images`, until they are worn.
     materials: Vec<Material>,
+    images: Vec<PathBuf>,
     warnings: Vec<String>,
     /// Where the materials went, once something wears them.
     first_material: Option<usize>,
@@ -83,14 +87,14 @@ impl Assembly {
     }
 
     fn keep(&mut self, identity: PathBuf, file: ObjFile) {
-        let ObjFile { parts, materials, mut warnings, material_warnings } = file;
+        let ObjFile { parts, materials, images, mut warnings, material_warnings } = file;
         self.warnings.append(&mut warnings);
         let mut indices = Vec::with_capacity(parts.len());
         for part in parts {
             indices.push((self.meshes.len(), part.material));
             self.meshes.push(part.mesh);
         }
-        let file = MeshFile { parts: indices, materials, warnings: material_warnings, first_material: None };
+        let file = MeshFile { parts: indices, materials, images, warnings: material_warnings, first_material: None };
         self.read.insert(identity, file);
     }
 
@@ -105,8 +109,11 @@ impl Assembly {
         let own = matches!(wear, Wear::Own);
         if own && file.first_material.is_none() {
             file.first_material = Some(self.materials.len());
-            self.materials.append(&mut file.materials);
             self.warnings.append(&mut file.warnings);
+            for mut material in file.materials.drain(..) {
+                open_image(files, &mut material, &file.images, &mut self.textures, &mut self.warnings);
+                self.materials.push(material);
+            }
         }
         if matches!(wear, Wear::ClearGlass) && !file.materials.is_empty() {
             let count = file.materials.len();
@@ -137,6 +144,25 @@ impl Assembly {
     pub fn bounds(&self) -> Bounds {
         self.objects.iter().fold(Bounds::EMPTY, |all, object| all.union(self.bounds_of(object)))
     }
+}
+
+/// Puts the texture in the place of an index into the `images` of a mesh file. As anywhere in such a file, an image
+/// that cannot be read is a warning.
+fn open_image(
+    files: Files,
+    material: &mut Material,
+    images: &[PathBuf],
+    textures: &mut Textures,
+    warnings: &mut Vec<String>,
+) {
+    let Surface::Opaque(opaque) = &mut material.surface else { return };
+    let Some(image) = opaque.base_color_texture else { return };
+    opaque.base_color_texture = textures
+        .open(files, &images[image], warnings)
+        .map_err(|error| {
+            warnings.push(format!("{}; material {:?} has its colour instead", error.in_full(), material.name))
+        })
+        .ok();
 }
 
 /// Whether the extension at `path` is one of a mesh that is read; the error says what to do.

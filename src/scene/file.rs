@@ -13,7 +13,7 @@ use super::files::Files;
 use super::material::Glass;
 use super::mesh::FARTHEST;
 use super::table::{Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT};
-use super::{Camera, Dielectric, Material, Opaque, PointLight, Surface, builtin};
+use super::{Camera, Dielectric, Dispersion, Material, Opaque, PointLight, Surface, builtin};
 use crate::options::RenderArgs;
 use crate::{Error, Result};
 
@@ -75,7 +75,8 @@ pub fn read(files: Files, path: &Path) -> Result<SceneFile> {
     let mut assembly = Assembly::default();
     if let Some(materials) = root.get("material") {
         for entry in materials.any_table("material.NAME")?.entries() {
-            assembly.materials.push(Material { name: entry.key.to_owned(), surface: reader.surface(entry)? });
+            let surface = reader.surface(entry, &mut assembly)?;
+            assembly.materials.push(Material { name: entry.key.to_owned(), surface });
         }
     }
     let objects = root.or("object", Vec::new(), |objects| {
@@ -194,7 +195,7 @@ impl Reader<'_> {
         Ok(text.into())
     }
 
-    fn surface(&self, entry: Entry<'_>) -> Result<Surface> {
+    fn surface(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<Surface> {
         let name = format!("material.{}", entry.key);
         let table = entry.any_table(&name)?;
         let Some(kind) = table.get("kind") else {
@@ -202,11 +203,11 @@ impl Reader<'_> {
         };
         match kind.choice(&[("dielectric", Kind::Dielectric), ("opaque", Kind::Opaque)])? {
             Kind::Dielectric => dielectric(&entry.table(&name, &DIELECTRIC_KEYS)?),
-            Kind::Opaque => self.opaque(&entry.table(&name, &OPAQUE_KEYS)?),
+            Kind::Opaque => self.opaque(&entry.table(&name, &OPAQUE_KEYS)?, assembly),
         }
     }
 
-    fn opaque(&self, table: &Table<'_>) -> Result<Surface> {
+    fn opaque(&self, table: &Table<'_>, assembly: &mut Assembly) -> Result<Surface> {
         let plain = Opaque::default();
         let texture = table.get("base_color_texture");
         if let (Some(texture), Some(_)) = (texture, table.get("base_color")) {
@@ -214,12 +215,17 @@ impl Reader<'_> {
         }
         Ok(Surface::Opaque(Opaque {
             base_color: table.or("base_color", plain.base_color, |entry| entry.triple(&UNIT))?,
-            base_color_texture: texture.map(|entry| self.path(entry)).transpose()?,
+            base_color_texture: texture.map(|entry| self.texture(entry, assembly)).transpose()?,
             metallic: table.or("metallic", plain.metallic, |entry| entry.number(&UNIT))?,
             roughness: table.or("roughness", plain.roughness, |entry| entry.number(&UNIT))?,
             specular: table.or("specular", plain.specular, |entry| entry.number(&UNIT))?,
             emission: table.or("emission", plain.emission, |entry| entry.triple(&LIGHT))?,
         }))
+    }
+
+    fn texture(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<usize> {
+        let texture = assembly.textures.open(self.files, &self.path(entry)?, &mut assembly.warnings);
+        texture.map_err(|error| entry.error(format!("{}: {}", entry.key, error.in_full())))
     }
 
     fn object<'a>(&self, entry: Entry<'a>, number: usize, materials: &[Material]) -> Result<ObjectTable<'a>> {
@@ -261,14 +267,23 @@ impl ObjectTable<'_> {
 
 fn dielectric(table: &Table<'_>) -> Result<Surface> {
     let clear = Dielectric::default();
-    let ior = |entry: Entry<'_>| match entry.as_text() {
-        Some(name) => Glass::named(name).map(|glass| glass.ior).map_err(|message| entry.error(message)),
-        None => entry.number(&INDEX),
+    // A glass brings its dispersion along.
+    let index = |entry: Entry<'_>| match entry.as_text() {
+        Some(name) => match Glass::named(name) {
+            Ok(glass) => Ok((glass.ior, glass.dispersion)),
+            Err(message) => Err(entry.error(message)),
+        },
+        None => Ok((entry.number(&INDEX)?, Dispersion::None)),
+    };
+    let (ior, own) = table.or("ior", (clear.ior, clear.dispersion), index)?;
+    let dispersion = |entry: Entry<'_>| match entry.number(&LIGHT)? {
+        0.0 => Ok(Dispersion::None),
+        number => Ok(Dispersion::Khr(number)),
     };
     Ok(Surface::Dielectric(Dielectric {
-        ior: table.or("ior", clear.ior, ior)?,
+        ior,
         roughness: table.or("roughness", clear.roughness, |entry| entry.number(&UNIT))?,
-        dispersion: table.or("dispersion", clear.dispersion, |entry| entry.number(&LIGHT))?,
+        dispersion: table.or("dispersion", own, dispersion)?,
         attenuation_color: table.or("attenuation_color", clear.attenuation_color, |entry| entry.triple(&UNIT))?,
         attenuation_distance: table
             .or("attenuation_distance", clear.attenuation_distance, |entry| entry.number(&POSITIVE_OR_INFINITE))?,

@@ -1,5 +1,6 @@
 //! Triangle meshes and what is wrong with them. In flow the vertices and triangles of a file, out flows a [`Mesh`]
-//! that a renderer can rely on: finite vertices, indices in range, no triangle without an area, unit normals.
+//! that a renderer can rely on: finite vertices, indices in range, no triangle without an area, unit normals, finite
+//! texture coordinates.
 //!
 //! What can be repaired is repaired and counted in [`MeshFaults`], the rest is refused with a [`Refusal`].
 
@@ -22,10 +23,29 @@ pub struct Mesh {
     pub positions: Vec<[f32; 3]>,
     /// Unit normals, one a vertex, or empty where the file has none.
     pub normals: Vec<[f32; 3]>,
+    /// Texture coordinates u and v, finite, one a vertex, or empty where the file has none. As OBJ has them: u grows to
+    /// the right, v upwards; (0, 0) is the bottom left corner of the image, (1, 1) the top right one, and the image
+    /// repeats beyond. Row 0 of a [`super::Texture`] is the top one, so its rows are counted by 1 - v.
+    pub uvs: Vec<[f32; 2]>,
     /// Indices of vertices.
     pub triangles: Vec<[u32; 3]>,
     /// What was wrong.
     pub faults: MeshFaults,
+}
+
+/// A mesh as a file holds it, nothing of it checked.
+#[derive(Clone, Debug, Default)]
+pub struct RawMesh {
+    /// What messages call it.
+    pub name: String,
+    /// Vertices.
+    pub positions: Vec<[f32; 3]>,
+    /// Empty, or one normal a vertex, of any length; one that has none, zero for instance, is replaced.
+    pub normals: Vec<[f32; 3]>,
+    /// Empty, or texture coordinates of each vertex with v upwards, as in [`Mesh::uvs`]; NaN where one has none.
+    pub uvs: Vec<[f32; 2]>,
+    /// Indices of vertices, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
 }
 
 /// What was wrong with a mesh, as counts.
@@ -45,6 +65,8 @@ pub struct MeshFaults {
     pub unused_vertices: usize,
     /// Normals that were zero, missing or not finite, replaced by those of the faces around.
     pub replaced_normals: usize,
+    /// Texture coordinates that were missing, not finite or beyond 1e9, replaced by (0, 0).
+    pub replaced_uvs: usize,
     /// Normals that point to the inside of a face around them.
     pub opposed_normals: usize,
 }
@@ -121,6 +143,7 @@ impl fmt::Display for MeshFaults {
             (self.degenerate_triangles, "degenerate triangle removed", "degenerate triangles removed"),
             (self.unused_vertices, "unused vertex", "unused vertices"),
             (self.replaced_normals, "normal replaced", "normals replaced"),
+            (self.replaced_uvs, "texture coordinate replaced by 0", "texture coordinates replaced by 0"),
             (self.opposed_normals, "normal against its face", "normals against their faces"),
         ];
         let mut separator = "";
@@ -139,13 +162,9 @@ impl fmt::Display for MeshFaults {
 }
 
 impl Mesh {
-    /// A mesh from what a file holds. `normals` is empty or has one normal a vertex, of any length.
-    pub fn new(
-        name: impl Into<String>,
-        positions: Vec<[f32; 3]>,
-        normals: Vec<[f32; 3]>,
-        mut triangles: Vec<[u32; 3]>,
-    ) -> Result<Self, Refusal> {
+    /// A mesh from what a file holds.
+    pub fn new(raw: RawMesh) -> Result<Self, Refusal> {
+        let RawMesh { name, positions, normals, uvs, mut triangles } = raw;
         let mut faults = MeshFaults::default();
         let bad = |position: &[f32; 3]| !position.iter().all(|x| f64::from(x.abs()) <= FARTHEST);
         if let Some(first) = positions.iter().position(bad) {
@@ -173,12 +192,16 @@ impl Mesh {
         let mut used = vec![false; vertices];
         triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
         faults.unused_vertices = used.iter().filter(|used| !**used).count();
-        let mut mesh = Self { name: name.into(), positions, normals, triangles, faults };
+        let mut mesh = Self { name, positions, normals, uvs, triangles, faults };
         if mesh.normals.len() != vertices {
             mesh.normals.clear();
         }
+        if mesh.uvs.len() != vertices {
+            mesh.uvs.clear();
+        }
         mesh.turn_normals(&inverted);
         mesh.mend_normals(&used);
+        mesh.mend_uvs(&used);
         Ok(mesh)
     }
 
@@ -227,6 +250,18 @@ impl Mesh {
         }
         self.faults.opposed_normals = opposed.into_iter().filter(|opposed| *opposed).count();
     }
+
+    fn mend_uvs(&mut self, used: &[bool]) {
+        // Beyond that, 32 bits leave nothing of where in the image it is.
+        let good = |uv: &[f32; 2]| uv.iter().all(|x| f64::from(x.abs()) <= FARTHEST);
+        if !self.uvs.iter().zip(used).any(|(uv, used)| *used && good(uv)) {
+            self.uvs.clear();
+        }
+        for (uv, used) in self.uvs.iter_mut().zip(used).filter(|(uv, _)| !good(uv)) {
+            self.faults.replaced_uvs += usize::from(*used);
+            *uv = [0.0; 2];
+        }
+    }
 }
 
 /// The normal with the length of twice the area.
@@ -261,7 +296,8 @@ mod tests {
     use super::*;
 
     fn mesh(positions: &[[f32; 3]], normals: &[[f32; 3]], triangles: &[[u32; 3]]) -> Result<Mesh, Refusal> {
-        Mesh::new("test", positions.to_vec(), normals.to_vec(), triangles.to_vec())
+        let [positions, normals] = [positions, normals].map(<[_]>::to_vec);
+        Mesh::new(RawMesh { positions, normals, triangles: triangles.to_vec(), ..RawMesh::default() })
     }
 
     const TETRAHEDRON: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -406,5 +442,25 @@ mod tests {
         let none = mesh(&TETRAHEDRON, &[[0.0; 3]; 4], &OUTWARD).unwrap();
         assert!(none.normals.is_empty() && none.faults.is_empty());
         assert!(mesh(&TETRAHEDRON, &[[0.0, 0.0, 1.0]; 3], &OUTWARD).unwrap().normals.is_empty());
+    }
+
+    #[test]
+    fn texture_coordinates_are_kept_mended_or_dropped() {
+        let with = |uvs: &[[f32; 2]]| {
+            let (positions, triangles) = (TETRAHEDRON.to_vec(), OUTWARD[..1].to_vec());
+            Mesh::new(RawMesh { positions, triangles, uvs: uvs.to_vec(), ..RawMesh::default() }).unwrap()
+        };
+        let good = [[0.0, 1.0], [-3.5, 7.25], [1e9, 0.0], [0.5, 0.5]];
+        assert_eq!((with(&good).uvs.as_slice(), with(&good).faults.replaced_uvs), (good.as_slice(), 0));
+        // The last vertex is of no triangle: mended, but not worth telling.
+        let (nan, infinite) = (f32::NAN, f32::INFINITY);
+        let mended = with(&[[0.25, nan], [0.5, 0.75], [-infinite, 0.0], [nan, nan]]);
+        assert_eq!(mended.uvs, [[0.0, 0.0], [0.5, 0.75], [0.0, 0.0], [0.0, 0.0]]);
+        assert_eq!(mended.faults.replaced_uvs, 2);
+        assert!(mended.faults.to_string().contains(", 2 texture coordinates replaced by 0"), "{}", mended.faults);
+        assert_eq!(with(&[[2e9, 0.0], [0.5, 0.5], [0.5, 0.5], [0.5, 0.5]]).faults.replaced_uvs, 1);
+        for none in [&[[nan; 2], [nan; 2], [nan; 2], [0.5; 2]][..], &[[0.5; 2]; 3], &[]] {
+            assert!(with(none).uvs.is_empty() && with(none).faults.replaced_uvs == 0);
+        }
     }
 }

@@ -18,8 +18,10 @@ mod mtl;
 mod obj;
 mod obj_text;
 mod table;
+mod texture;
 mod topology;
 
+use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DVec3};
@@ -27,14 +29,16 @@ use glam::{DAffine3, DVec3};
 pub use bounds::Bounds;
 pub use camera::Camera;
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
-pub use material::{Dielectric, GLASSES, Glass, Material, Opaque, Surface};
-pub use mesh::{Mesh, MeshFaults, Refusal};
+pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
+pub use mesh::{Mesh, MeshFaults, RawMesh, Refusal};
+pub use texture::{Texels, Texture};
 
 use crate::options::RenderArgs;
 use crate::{Error, Result};
 use assembly::{Assembly, Placement, Wear};
 use file::{EnvironmentTable, Light, SceneFile};
 use files::Files;
+use obj::shorten;
 
 /// Everything that a picture shows.
 #[derive(Clone, Debug)]
@@ -51,6 +55,8 @@ pub struct Scene {
     pub lights: Vec<PointLight>,
     /// Materials, each with its name.
     pub materials: Vec<Material>,
+    /// The images that materials name; several may share one.
+    pub textures: Vec<Texture>,
     /// Meshes; several objects may share one.
     pub meshes: Vec<Mesh>,
     /// The meshes in their places.
@@ -89,7 +95,7 @@ pub struct Object {
 /// What a command line puts in the place of what a scene says.
 #[derive(Clone, Debug, Default)]
 pub struct Overrides {
-    /// Index of every dielectric.
+    /// Index of every dielectric, in the place of that of a glass and its dispersion.
     pub ior: Option<f64>,
     /// Roughness of every dielectric.
     pub roughness: Option<f64>,
@@ -129,10 +135,14 @@ impl Scene {
         };
         let framed = camera.is_none();
         let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
-        let Assembly { meshes, objects, mut materials, mut warnings, .. } = assembly;
+        let Assembly { meshes, objects, mut materials, textures, mut warnings, .. } = assembly;
+        let textures = textures.all;
+        warn_of_missing_uvs(&objects, &meshes, &materials, &textures, &mut warnings);
         for material in &mut materials {
             if let Surface::Dielectric(dielectric) = &mut material.surface {
-                dielectric.ior = overrides.ior.unwrap_or(dielectric.ior);
+                if let Some(ior) = overrides.ior {
+                    dielectric.set_ior(ior);
+                }
                 dielectric.roughness = overrides.roughness.unwrap_or(dielectric.roughness);
             }
         }
@@ -142,7 +152,7 @@ impl Scene {
             Light::Color(color) => Surroundings::Color(color),
         };
         let environment = Environment { light, intensity, rotation, visible };
-        Ok(Self { name, environment, camera, framed, lights, materials, meshes, objects, render, warnings })
+        Ok(Self { name, environment, camera, framed, lights, materials, textures, meshes, objects, render, warnings })
     }
 
     /// Moves a camera that was not given, so that an image that is `aspect` times as wide as high shows all objects.
@@ -162,6 +172,31 @@ impl Scene {
         let bounds = self.objects.iter().fold(Bounds::EMPTY, |all, object| all.union(self.bounds_of(object)));
         (!bounds.is_empty()).then_some(bounds)
     }
+}
+
+/// Says which meshes wear a texture but have no coordinates for it.
+fn warn_of_missing_uvs(
+    objects: &[Object],
+    meshes: &[Mesh],
+    materials: &[Material],
+    textures: &[Texture],
+    warnings: &mut Vec<String>,
+) {
+    let before = warnings.len();
+    let mut told = HashSet::new();
+    for object in objects {
+        let (mesh, material) = (&meshes[object.mesh], &materials[object.material]);
+        let Surface::Opaque(Opaque { base_color_texture: Some(texture), .. }) = material.surface else { continue };
+        if mesh.uvs.is_empty() && told.insert((object.mesh, object.material)) {
+            warnings.push(format!(
+                "{}: has no texture coordinates; material {:?} shows the bottom left corner of {} all over it",
+                mesh.name,
+                material.name,
+                textures[texture].name()
+            ));
+        }
+    }
+    shorten(warnings, before, "meshes lack texture coordinates");
 }
 
 /// A mesh of clear glass in the default environment.

@@ -1,4 +1,5 @@
-//! Materials of Wavefront MTL files. In flow the names of the files, out flow [`Material`]s and remarks.
+//! Materials of Wavefront MTL files. In flow the names of the files, out flow [`Material`]s, the paths of their images
+//! and remarks.
 //!
 //! | MTL | becomes |
 //! | --- | --- |
@@ -25,8 +26,15 @@ use super::obj::shorten;
 /// Metres over which `Tf` is taken to act.
 const FILTER_DISTANCE: f64 = 1.0;
 
-/// The materials of the `libraries` that the `.obj` at `obj` names. What cannot be read is a remark.
-pub fn read_all(files: Files, obj: &Path, libraries: &[String], remarks: &mut Vec<String>) -> Vec<Material> {
+/// The materials of the `libraries` that the `.obj` at `obj` names. Their textures are indices into `images`, where the
+/// paths are added. What cannot be read is a remark.
+pub fn read_all(
+    files: Files,
+    obj: &Path,
+    libraries: &[String],
+    images: &mut Vec<PathBuf>,
+    remarks: &mut Vec<String>,
+) -> Vec<Material> {
     let folder = obj.parent().unwrap_or(Path::new(""));
     let mut done = HashSet::new();
     let mut materials = Vec::new();
@@ -40,7 +48,7 @@ pub fn read_all(files: Files, obj: &Path, libraries: &[String], remarks: &mut Ve
         for path in paths {
             if done.insert(files.identity(&path)) {
                 let before = remarks.len();
-                materials.extend(read(files, &path, remarks));
+                materials.extend(read(files, &path, images, remarks));
                 shorten(remarks, before, "remarks on this file's materials");
             }
         }
@@ -48,12 +56,11 @@ pub fn read_all(files: Files, obj: &Path, libraries: &[String], remarks: &mut Ve
     materials
 }
 
-fn read(files: Files, path: &Path, remarks: &mut Vec<String>) -> Vec<Material> {
+fn read(files: Files, path: &Path, images: &mut Vec<PathBuf>, remarks: &mut Vec<String>) -> Vec<Material> {
     let bytes = match files.read(path) {
         Ok(bytes) => bytes,
         Err(error) => {
-            let reason = std::error::Error::source(&error).map(|source| format!(": {source}")).unwrap_or_default();
-            remarks.push(format!("{error}{reason}; its materials are replaced by clear glass"));
+            remarks.push(format!("{}; its materials are replaced by clear glass", error.in_full()));
             return Vec::new();
         }
     };
@@ -76,7 +83,7 @@ fn read(files: Files, path: &Path, remarks: &mut Vec<String>) -> Vec<Material> {
     }
     match tobj::load_mtl_buf(&mut tidy.as_bytes()) {
         Ok((materials, _)) => {
-            materials.into_iter().map(|m| Converter { files, path, remarks, material: &m }.convert()).collect()
+            materials.into_iter().map(|m| Converter { files, path, images, remarks, material: &m }.convert()).collect()
         }
         Err(error) => {
             remarks.push(format!("{}: cannot be read as MTL: {error}", path.display()));
@@ -136,6 +143,7 @@ fn image_name(mut rest: &str) -> Option<String> {
 struct Converter<'a> {
     files: Files,
     path: &'a Path,
+    images: &'a mut Vec<PathBuf>,
     remarks: &'a mut Vec<String>,
     material: &'a tobj::Material,
 }
@@ -197,12 +205,13 @@ impl Converter<'_> {
         Opaque { base_color, base_color_texture: texture, metallic, roughness, specular, emission }
     }
 
-    fn texture(&mut self) -> Option<PathBuf> {
+    fn texture(&mut self) -> Option<usize> {
         // Exporters for Windows write its separator.
         let name = self.material.diffuse_texture.as_ref()?.replace('\\', "/");
         let path = self.path.parent().unwrap_or(Path::new("")).join(name);
         if self.files.exists(&path) {
-            return Some(path);
+            self.images.push(path);
+            return Some(self.images.len() - 1);
         }
         self.remark(&format!("map_Kd {:?} does not exist; the colour is used", path.display().to_string()));
         None

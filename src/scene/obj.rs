@@ -1,15 +1,15 @@
 //! Wavefront OBJ. In flow the bytes of an `.obj` and of the `.mtl` it names, out flow parts: a mesh and what it wears.
 //!
 //! A part is what an `o` line opens, cut where the material changes; groups (`g`) cut nothing, because a piece of a
-//! closed surface bounds no medium. Polygons are cut as fans. Points, lines, free-form geometry and texture
-//! coordinates are left out. [`super::obj_text`] tidies the text, then `tobj` reads it.
+//! closed surface bounds no medium. Polygons are cut as fans. Points, lines and free-form geometry are left out.
+//! [`super::obj_text`] tidies the text, then `tobj` reads it.
 
 use std::collections::HashMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::files::Files;
 use super::material::Material;
-use super::mesh::{Mesh, Refusal};
+use super::mesh::{Mesh, RawMesh, Refusal};
 use super::mtl;
 use super::obj_text::{Tidy, bad_number};
 use crate::{Error, Result};
@@ -19,8 +19,10 @@ use crate::{Error, Result};
 pub struct ObjFile {
     /// Meshes with indices into [`ObjFile::materials`].
     pub parts: Vec<Part>,
-    /// The materials of the MTL files.
+    /// The materials of the MTL files that parts wear; their textures are indices into [`ObjFile::images`].
     pub materials: Vec<Material>,
+    /// The images that they name, not opened yet.
+    pub images: Vec<PathBuf>,
     /// What is wrong with the meshes, one line each.
     pub warnings: Vec<String>,
     /// What is wrong with the materials, which matters only to those who use them.
@@ -46,7 +48,8 @@ pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
     let tidy = Tidy::new(&text).map_err(|(line, message)| Error::input(path, line, message))?;
 
     let mut material_warnings = Vec::new();
-    let materials = mtl::read_all(files, path, &tidy.libraries, &mut material_warnings);
+    let mut images = Vec::new();
+    let materials = mtl::read_all(files, path, &tidy.libraries, &mut images, &mut material_warnings);
     // As in an MTL file, the last one of a name counts.
     let numbers: HashMap<&str, usize> = materials.iter().enumerate().map(|(i, m)| (m.name.as_str(), i)).collect();
     let before = material_warnings.len();
@@ -66,17 +69,9 @@ pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
     })?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let mut warnings: Vec<_> = tidy.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
-    let parts = parts(path, &file, &text, models, &mut warnings)?;
-    Ok(ObjFile { parts, materials, warnings, material_warnings })
-}
-
-#[derive(Default)]
-struct RawPart {
-    name: String,
-    material: Option<usize>,
-    positions: Vec<[f32; 3]>,
-    normals: Vec<[f32; 3]>,
-    triangles: Vec<[u32; 3]>,
+    let mut parts = parts(path, &file, &text, models, &mut warnings)?;
+    let materials = worn(&mut parts, materials);
+    Ok(ObjFile { parts, materials, images, warnings, material_warnings })
 }
 
 /// Joins the models that tobj cut a part into, and checks each part.
@@ -87,17 +82,18 @@ fn parts(
     models: Vec<tobj::Model>,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Part>> {
-    let mut raw: Vec<RawPart> = Vec::new();
+    let mut raw: Vec<(RawMesh, Option<usize>)> = Vec::new();
     let mut numbers = HashMap::new();
     for tobj::Model { mesh, name } in models {
         let number = *numbers.entry((name.clone(), mesh.material_id)).or_insert_with(|| {
-            raw.push(RawPart { name, material: mesh.material_id, ..RawPart::default() });
+            raw.push((RawMesh { name, ..RawMesh::default() }, mesh.material_id));
             raw.len() - 1
         });
-        let part = &mut raw[number];
+        let (part, _) = &mut raw[number];
         let offset = part.positions.len() as u32;
         part.positions.extend(mesh.positions.as_chunks().0);
         part.normals.extend(mesh.normals.as_chunks().0);
+        part.uvs.extend(mesh.texcoords.as_chunks().0);
         let triangles = mesh.indices.as_chunks().0.iter();
         part.triangles.extend(triangles.map(|triangle| triangle.map(|vertex| vertex + offset)));
     }
@@ -105,9 +101,9 @@ fn parts(
     let before = warnings.len();
     let mut parts = Vec::new();
     let mut lost = 0;
-    for RawPart { name, material, positions, normals, triangles } in raw {
-        let name = if several { format!("{file} ({name})") } else { file.to_owned() };
-        match Mesh::new(name, positions, normals, triangles) {
+    for (mut part, material) in raw {
+        part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
+        match Mesh::new(part) {
             Ok(mesh) => {
                 if !mesh.faults.is_empty() {
                     warnings.push(format!("{}: {}", mesh.name, mesh.faults));
@@ -129,6 +125,21 @@ fn parts(
         warnings.push(format!("{file}: {lost} degenerate triangles removed, and the parts that held nothing else"));
     }
     Ok(parts)
+}
+
+/// The materials that parts wear: a library may hold many more, and their images.
+fn worn(parts: &mut [Part], materials: Vec<Material>) -> Vec<Material> {
+    let mut numbers = vec![None; materials.len()];
+    let mut count = 0;
+    for number in parts.iter_mut().filter_map(|part| part.material.as_mut()) {
+        *number = *numbers[*number].get_or_insert_with(|| {
+            count += 1;
+            count - 1
+        });
+    }
+    let mut worn: Vec<_> = numbers.into_iter().zip(materials).filter_map(|(number, m)| Some((number?, m))).collect();
+    worn.sort_by_key(|(number, _)| *number);
+    worn.into_iter().map(|(_, material)| material).collect()
 }
 
 /// Keeps the first of the remarks from `start` on, and says how many more of `what` there are.

@@ -1,9 +1,10 @@
 //! Tidies the text of an OBJ file for `tobj`. In flow the text as found, out flows one that `tobj` reads right, or the
 //! line that is wrong.
 //!
-//! `tobj` takes polylines for polygons, mixes up normals where some corners have none, divides by w, overflows on
-//! hostile indices, and has no line numbers. So indices are resolved and checked here, all vertices come first, and
-//! corners without a normal get one of zero, which [`super::mesh`] replaces.
+//! `tobj` takes polylines for polygons, mixes up normals and texture coordinates where some corners have none, divides
+//! by w, overflows on hostile indices, and has no line numbers. So indices are resolved and checked here, all vertices
+//! come first, corners without a normal get one of zero, and those without texture coordinates NaN: [`super::mesh`]
+//! replaces both.
 
 use std::borrow::Cow;
 use std::collections::HashSet;
@@ -14,7 +15,7 @@ use super::mesh::FARTHEST;
 /// What an OBJ file says, in a form without traps.
 #[derive(Debug, Default)]
 pub struct Tidy {
-    /// OBJ text of `mtllib`, `v`, `vn`, `o`, `usemtl` and `f` lines, each with absolute indices.
+    /// OBJ text of `mtllib`, `v`, `vt`, `vn`, `o`, `usemtl` and `f` lines, each with absolute indices.
     pub text: String,
     /// File names after `mtllib`, each line once.
     pub libraries: Vec<String>,
@@ -30,9 +31,28 @@ pub type Fault = (usize, String);
 /// How many vertices, texture coordinates and normals there are.
 type Counts = [usize; 3];
 
+/// A kind of line that faces refer to.
+struct Kind {
+    keyword: &'static str,
+    /// How it is written, for messages.
+    form: &'static str,
+    /// How many of its numbers count.
+    kept: usize,
+    /// How many must be there; the rest are 0.
+    needed: usize,
+}
+
+/// In the order of [`Counts`].
+const KINDS: [Kind; 3] = [
+    Kind { keyword: "v", form: "v X Y Z", kept: 3, needed: 3 },
+    // A third number is for images with depth.
+    Kind { keyword: "vt", form: "vt U V", kept: 2, needed: 1 },
+    Kind { keyword: "vn", form: "vn X Y Z", kept: 3, needed: 3 },
+];
+
 /// Keywords that say nothing about triangles.
-const SILENT: [&str; 13] =
-    ["vt", "vp", "g", "s", "mg", "lod", "bevel", "c_interp", "d_interp", "usemap", "maplib", "shadow_obj", "trace_obj"];
+const SILENT: [&str; 12] =
+    ["vp", "g", "s", "mg", "lod", "bevel", "c_interp", "d_interp", "usemap", "maplib", "shadow_obj", "trace_obj"];
 
 /// Keywords of geometry that is no polygon.
 const FREE_FORM: [&str; 14] =
@@ -48,33 +68,32 @@ impl Tidy {
         Ok(tidy)
     }
 
-    /// Writes the lines of vertices and normals, and one zero normal.
+    /// Writes the lines of vertices, texture coordinates and normals, and behind them those for corners without.
     fn vertices(&mut self, text: &str) -> Result<Counts, Fault> {
-        let [mut vertices, mut coordinates, mut normals] = [0; 3];
-        let mut zero_normal = String::new();
+        let mut counts = [0; 3];
+        let mut blocks = [std::mem::take(&mut self.text), String::new(), String::new()];
         for (number, line) in lines(text) {
             let (keyword, rest) = split_keyword(&line);
-            let (count, out) = match keyword {
-                "v" => (&mut vertices, &mut self.text),
-                "vn" => (&mut normals, &mut zero_normal),
-                "vt" => {
-                    coordinates += 1;
-                    continue;
-                }
-                _ => continue,
-            };
-            *count += 1;
+            let Some((index, kind)) = kind_of(keyword) else { continue };
+            counts[index] += 1;
+            let out = &mut blocks[index];
+            out.push_str(keyword);
             let mut numbers = rest.split_ascii_whitespace();
-            let (Some(x), Some(y), Some(z)) = (numbers.next(), numbers.next(), numbers.next()) else {
-                return Err((number, format!("{:?} lacks a number; expected {keyword} X Y Z", excerpt(&line))));
-            };
-            for part in [keyword, " ", x, " ", y, " ", z, "\n"] {
-                out.push_str(part);
+            for place in 0..kind.kept {
+                let Some(word) = numbers.next().or((place >= kind.needed).then_some("0")) else {
+                    return Err((number, format!("{:?} lacks a number; expected {}", excerpt(&line), kind.form)));
+                };
+                out.push(' ');
+                out.push_str(word);
             }
+            out.push('\n');
         }
-        self.text.push_str(&zero_normal);
-        self.text.push_str("vn 0 0 0\n");
-        Ok([vertices, coordinates, normals])
+        let [vertices, coordinates, normals] = blocks;
+        self.text = vertices;
+        for rest in [&coordinates, "vt nan nan\n", &normals, "vn 0 0 0\n"] {
+            self.text.push_str(rest);
+        }
+        Ok(counts)
     }
 
     /// Writes the faces and what names them.
@@ -98,7 +117,7 @@ impl Tidy {
                         Ok(corners) if corners.len() < 3 => slivers += 1,
                         Ok(corners) => {
                             corners.iter().for_each(|corner| used[corner.vertex] = true);
-                            self.face(&corners, totals[2]);
+                            self.face(&corners, totals);
                         }
                     }
                 }
@@ -156,19 +175,29 @@ impl Tidy {
         }
     }
 
-    /// A face whose corners without a normal get the zero normal at the end of all `normals`.
-    fn face(&mut self, corners: &[Corner<'_>], normals: usize) {
+    /// A face whose corners without texture coordinates or a normal get those at the end of all.
+    fn face(&mut self, corners: &[Corner<'_>], [_, coordinates, normals]: Counts) {
         self.text.push('f');
         for corner in corners {
             self.text.push(' ');
             push_index(&mut self.text, corner.vertex_text, corner.vertex);
+            if coordinates + normals > 0 {
+                self.text.push('/');
+            }
+            if coordinates > 0 {
+                push_index(&mut self.text, corner.coordinate_text, corner.coordinate.unwrap_or(coordinates));
+            }
             if normals > 0 {
-                self.text.push_str("//");
+                self.text.push('/');
                 push_index(&mut self.text, corner.normal_text, corner.normal.unwrap_or(normals));
             }
         }
         self.text.push('\n');
     }
+}
+
+fn kind_of(keyword: &str) -> Option<(usize, &'static Kind)> {
+    KINDS.iter().enumerate().find(|(_, kind)| kind.keyword == keyword)
 }
 
 /// Appends the index, from 0, as OBJ counts it; `text` is what stood there.
@@ -192,6 +221,8 @@ fn remember(known: &mut HashSet<String>, names: &mut Vec<String>, name: &str) {
 struct Corner<'a> {
     vertex: usize,
     vertex_text: &'a str,
+    coordinate: Option<usize>,
+    coordinate_text: &'a str,
     normal: Option<usize>,
     normal_text: &'a str,
 }
@@ -214,11 +245,9 @@ impl<'a> Corner<'a> {
             resolve(text, ["vertex", "texture coordinate", "normal"][kind], so_far[kind], totals[kind])
         };
         let vertex = index(vertex_text, 0)?;
-        if !coordinate_text.is_empty() {
-            index(coordinate_text, 1)?;
-        }
+        let coordinate = if coordinate_text.is_empty() { None } else { Some(index(coordinate_text, 1)?) };
         let normal = if normal_text.is_empty() { None } else { Some(index(normal_text, 2)?) };
-        Ok(Self { vertex, vertex_text, normal, normal_text })
+        Ok(Self { vertex, vertex_text, coordinate, coordinate_text, normal, normal_text })
     }
 }
 
@@ -235,18 +264,17 @@ fn resolve(text: &str, what: &str, so_far: usize, total: usize) -> Result<usize,
     Err(BadCorner { malformed: false, message })
 }
 
-/// The first line of a vertex or normal that holds no number or, for a vertex, one that cannot be used.
+/// The first line of a vertex, texture coordinate or normal that holds no number or, for a vertex, one that cannot be
+/// used.
 pub fn bad_number(text: &str) -> Option<Fault> {
     let mut first: Option<Fault> = None;
     let mut count = 0;
     for (number, line) in lines(text) {
         let (keyword, rest) = split_keyword(&line);
-        if keyword != "v" && keyword != "vn" {
-            continue;
-        }
-        for word in rest.split_ascii_whitespace().take(3) {
+        let Some((_, kind)) = kind_of(keyword) else { continue };
+        for word in rest.split_ascii_whitespace().take(kind.kept) {
             match word.parse::<f32>() {
-                Err(_) => return Some((number, format!("{:?} is no number; expected {keyword} X Y Z", excerpt(word)))),
+                Err(_) => return Some((number, format!("{:?} is no number; expected {}", excerpt(word), kind.form))),
                 Ok(value) if keyword == "v" && (value.is_nan() || f64::from(value.abs()) > FARTHEST) => {
                     count += 1;
                     first.get_or_insert_with(|| {
@@ -316,9 +344,24 @@ mod tests {
     #[test]
     fn what_tobj_misreads_is_rewritten() {
         let text = "v 0 0 0 1 2 3 9\nv 1 0 0 5\nv 0 1 \\\n0\nvt 0 0\nvn 0 0 1\nf -3/1/1 -2 +3//-1\nl 1 2 3\n";
-        let expected = "mtllib -\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvn 0 0 1\nvn 0 0 0\nf 1//1 2//2 3//1\n";
+        let expected = "mtllib -\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt nan nan\nvn 0 0 1\nvn 0 0 0\n\
+            f 1/1/1 2/2/2 3/2/1\n";
         assert_eq!(tidy(text).text, expected);
         assert_eq!(tidy(text).remarks, ["1 line or point, as only faces are shown, left out"]);
+    }
+
+    #[test]
+    fn corners_name_what_the_file_has() {
+        let last = |text: &str| tidy(&format!("{text}{TRIANGLE}")).text.lines().last().map(str::to_owned).unwrap();
+        assert_eq!(last("f 1 2 3\n"), "f 1 2 3");
+        assert_eq!(last("vt 0 0\nf 1/1 2 3\n"), "f 1/1 2/2 3/2");
+        assert_eq!(last("vn 0 0 1\nf 1//1 2 3\n"), "f 1//1 2//2 3//2");
+        assert_eq!(last("vt 0\nvn 0 0 1\nf 1/1 2//-1 3/-1/1\n"), "f 1/1/2 2/2/1 3/1/1");
+    }
+
+    #[test]
+    fn texture_coordinates_have_two_numbers() {
+        assert!(tidy(&format!("vt 0.5\nvt 1 2 3\n{TRIANGLE}")).text.contains("\nvt 0.5 0\nvt 1 2\nvt nan nan\n"));
     }
 
     #[test]
@@ -346,6 +389,7 @@ mod tests {
             ("f /1 2 3", "is no corner"),
             ("v 1 2", "\"v 1 2\" lacks a number; expected v X Y Z"),
             ("vn", "expected vn X Y Z"),
+            ("vt", "\"vt\" lacks a number; expected vt U V"),
         ] {
             let (number, message) = fault(&format!("{TRIANGLE}{line}\n"));
             assert_eq!(number, 4);
@@ -380,5 +424,7 @@ mod tests {
             bad_number("v 0 0 0\nvn 0 zero 0\n").unwrap(),
             (2, "\"zero\" is no number; expected vn X Y Z".into())
         );
+        let (line, message) = bad_number("vt 0 nan depth\nvt 1e99\nvt 0 right\n").unwrap();
+        assert_eq!((line, message.as_str()), (3, "\"right\" is no number; expected vt U V"));
     }
 }

@@ -4,8 +4,9 @@ use std::fs;
 use std::path::Path;
 
 use glam::DVec3;
+use vitrum::effects::Effect;
 use vitrum::options::Model;
-use vitrum::scene::{Dielectric, Opaque, Overrides, Scene, Surroundings};
+use vitrum::scene::{Dielectric, Dispersion, GLASSES, Opaque, Overrides, Scene, Surroundings};
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
@@ -85,7 +86,7 @@ fn everything_is_read() {
         &Dielectric {
             ior: 1.5168,
             roughness: 0.25,
-            dispersion: 0.3,
+            dispersion: Dispersion::Khr(0.3),
             attenuation_color: DVec3::new(1.0, 0.5, 0.0),
             attenuation_distance: 0.2,
             thin_walled: true,
@@ -96,13 +97,14 @@ fn everything_is_read() {
         opaque(&scene, 1),
         &Opaque {
             base_color: DVec3::splat(0.8),
-            base_color_texture: Some(folder.path("sky.png")),
+            base_color_texture: Some(0),
             metallic: 0.5,
             roughness: 0.75,
             specular: 0.125,
             emission: DVec3::new(0.0, 0.0, 12.0),
         }
     );
+    assert_eq!((scene.textures.len(), &scene.textures[0].path), (1, &folder.path("sky.png")));
     assert_eq!(scene.meshes.len(), 1, "one file is read once");
     assert_eq!((scene.objects[0].number, scene.objects[1].number), (0, 1));
     assert_eq!((scene.objects[0].smooth, scene.objects[1].smooth), (false, true));
@@ -120,7 +122,7 @@ fn everything_is_read() {
     let bounds = scene.bounds().unwrap();
     assert!((bounds.min - DVec3::new(-2.0, 0.0, 0.0)).length() < 1e-12, "{bounds:?}");
     assert!((bounds.max - DVec3::new(1.0, 3.0, 5.0)).length() < 1e-12, "{bounds:?}");
-    assert!(scene.warnings.is_empty(), "{:?}", scene.warnings);
+    assert!(scene.warnings.len() == 1 && scene.warnings[0].contains("no texture coordinates"), "{:?}", scene.warnings);
 }
 
 #[test]
@@ -289,6 +291,56 @@ fn glasses_are_named() {
     assert_eq!(dielectric(&folder.material("dielectric", "ior = \"water\"").unwrap(), 0).ior, 1.33299);
     let fault = folder.fault("[material.m]\nkind = \"dielectric\"\n\nior = \"bk9\"\n");
     assert!(fault.starts_with("4: unknown glass \"bk9\"; known: acrylic, baf10, bk7, diamond"), "{fault}");
+}
+
+#[test]
+fn glasses_disperse_unless_told_otherwise() {
+    let folder = Folder::new();
+    let calls = |scene: &Scene| Effect::Dispersion.called_for_by(scene);
+    for glass in GLASSES {
+        let scene = folder.material("dielectric", &format!("ior = {:?}", glass.name)).unwrap();
+        assert_eq!((dielectric(&scene, 0).ior, dielectric(&scene, 0).dispersion), (glass.ior, glass.dispersion));
+        assert_eq!(calls(&scene), glass.name != "ice", "{}", glass.name);
+        for zero in ["0", "0.0", "-0.0"] {
+            let scene = folder.material("dielectric", &format!("ior = {:?}\ndispersion = {zero}", glass.name)).unwrap();
+            assert_eq!((dielectric(&scene, 0).ior, dielectric(&scene, 0).dispersion), (glass.ior, Dispersion::None));
+            assert!(!calls(&scene));
+        }
+        let scene = folder.material("dielectric", &format!("dispersion = 0.4\nior = {:?}", glass.name)).unwrap();
+        assert_eq!((dielectric(&scene, 0).ior, dielectric(&scene, 0).dispersion), (glass.ior, Dispersion::Khr(0.4)));
+        assert!(calls(&scene));
+    }
+    let law = |lines: &str| dielectric(&folder.material("dielectric", lines).unwrap(), 0).dispersion;
+    assert_eq!((law(""), law("ior = 1.5168")), (Dispersion::None, Dispersion::None));
+    assert_eq!(
+        (law("dispersion = 0.4"), law("ior = 1.7\ndispersion = 1")),
+        (Dispersion::Khr(0.4), Dispersion::Khr(1.0))
+    );
+    let pane = folder.material("dielectric", "ior = \"sf11\"\nthin_walled = true").unwrap();
+    assert!(dielectric(&pane, 0).disperses() && !calls(&pane));
+}
+
+#[test]
+fn an_index_in_the_place_of_a_glass_takes_its_dispersion() {
+    let folder = Folder::new();
+    let overrides = Overrides { ior: Some(1.6), ..Overrides::default() };
+    for (lines, expected) in [
+        ("ior = \"sf11\"", Dispersion::None),
+        ("ior = \"water\"", Dispersion::None),
+        ("ior = \"sf11\"\ndispersion = 0", Dispersion::None),
+        ("ior = \"sf11\"\ndispersion = 0.4", Dispersion::Khr(0.4)),
+        ("ior = 1.3\ndispersion = 0.4", Dispersion::Khr(0.4)),
+    ] {
+        folder.material("dielectric", lines).unwrap();
+        let named = Scene::load(Some(&folder.path("scene.toml")), &overrides).unwrap();
+        // The scene's own option does as the command line's.
+        let optional = folder.material("dielectric", &format!("{lines}\n[render]\nior = 1.6")).unwrap();
+        for scene in [named, optional] {
+            let glass = dielectric(&scene, 0);
+            assert_eq!((glass.ior, glass.dispersion), (1.6, expected), "{lines}");
+            assert_eq!(Effect::Dispersion.called_for_by(&scene), expected != Dispersion::None, "{lines}");
+        }
+    }
 }
 
 #[test]

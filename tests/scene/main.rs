@@ -2,6 +2,7 @@
 
 mod files;
 mod meshes;
+mod textures;
 
 use std::fs;
 use std::path::PathBuf;

@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::DVec3;
-use vitrum::scene::{Dielectric, Opaque, Surface};
+use vitrum::scene::{Dielectric, Opaque, Scene, Surface};
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
@@ -60,6 +60,73 @@ fn normals_are_kept_mended_or_dropped() {
 }
 
 #[test]
+fn texture_coordinates_are_read_with_their_vertices() {
+    let folder = Folder::new();
+    let load = |coordinates: &str, faces: &str| {
+        folder.write("mesh.obj", format!("v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n{coordinates}\n{faces}\n"));
+        folder.load("mesh.obj")
+    };
+    // What each corner of each triangle has, and the largest vertex number.
+    let corners = |coordinates: &str, faces: &str| {
+        let mesh = load(coordinates, faces).unwrap().meshes.remove(0);
+        assert!(mesh.uvs.is_empty() || mesh.uvs.len() == mesh.positions.len());
+        let corner = |vertex: &u32| (mesh.positions[*vertex as usize], mesh.uvs[*vertex as usize]);
+        (mesh.triangles.iter().flatten().map(corner).collect::<Vec<_>>(), mesh.positions.len())
+    };
+    // v stays as OBJ has it, upwards; a vertex that two triangles share with the same coordinates is one vertex.
+    let (a, b, c, d) = ([0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]);
+    let square = "vt 0 0.25\nvt 1 0.25 0.5\nvt 0\nvt -3 8.5";
+    let (found, vertices) = corners(square, "f 1/1 2/2 4/4 3/3");
+    let [at_a, at_b, at_c, at_d] = [(a, [0.0, 0.25]), (b, [1.0, 0.25]), (c, [0.0, 0.0]), (d, [-3.0, 8.5])];
+    assert_eq!((found.as_slice(), vertices), ([at_a, at_b, at_d, at_a, at_d, at_c].as_slice(), 4));
+    // A seam splits the vertices along it, with and without normals, and indices may count back.
+    let expected = [at_a, at_b, at_d, at_a, (d, [0.0, 0.0]), at_c];
+    for (extra, faces) in [
+        ("", "f 1/1 2/2 4/4\nf 1/1 4/3 3/3"),
+        ("\nvn 0 0 1", "f 1/1/1 2/2/1 4/4/1\nf 1/1/1 4/3/1 3/3/1"),
+        ("\nvn 0 0 1", "f -4/-4/-1 -3/-3/-1 -1/-1/-1\nf 1/-4 -1/-2 3/-2"),
+    ] {
+        let (found, _) = corners(&format!("{square}{extra}"), faces);
+        assert_eq!(found, expected, "{faces}");
+    }
+    assert_eq!(corners(square, "f 1/1 2/2 4/4\nf 1/1 4/3 3/3").1, 5);
+
+    // Corners without any, or with some that are none, have (0, 0), and are counted.
+    let (found, _) = corners("vt 0.5 0.75\nvt nan 1\nvt 0 -inf", "f 1/1 2/2 4/3\nf 1/1 4 3");
+    assert_eq!(found[0], (a, [0.5, 0.75]));
+    assert!(found.iter().all(|(position, uv)| *position == a || *uv == [0.0, 0.0]), "{found:?}");
+    let warnings = load("vt 0.5 0.75\nvt nan 1\nvt 0 -inf", "f 1/1 2/2 4/3\nf 1/1 4 3").unwrap().warnings;
+    assert!(warnings[0].contains(", 4 texture coordinates replaced by 0"), "{warnings:?}");
+    // No usable ones are none, as are those that no face names.
+    for (coordinates, faces) in [("", "f 1 2 4"), ("vt 0.5 0.5", "f 1 2 4"), ("vt nan 0\nvt 1 1", "f 1/1 2/1 4")] {
+        let scene = load(coordinates, faces).unwrap();
+        assert!(scene.meshes[0].uvs.is_empty() && !scene.warnings[0].contains("texture"), "{:?}", scene.warnings);
+    }
+    for (coordinates, faces, expected) in [
+        ("vt 0 0", "f 1/1 2/1 4/2", "mesh.obj:6: a face names texture coordinate 2, which does not exist"),
+        ("vt 0 0", "f 1/0 2/1 4/1", "mesh.obj:6: a face names texture coordinate 0, which does not exist"),
+        ("vt 0 0", "f 1/-2 2/1 4/1", "mesh.obj:6: a face names texture coordinate -2, which does not exist"),
+        ("vt", "f 1/1 2/1 4/1", "mesh.obj:5: \"vt\" lacks a number; expected vt U V"),
+        ("vt 0 up", "f 1/1 2/1 4/1", "mesh.obj:5: \"up\" is no number; expected vt U V"),
+    ] {
+        let error = load(coordinates, faces).unwrap_err().to_string();
+        assert!(error.contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn parts_keep_their_own_texture_coordinates() {
+    let folder = Folder::new();
+    let text = "v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0.25 0.5\no plain\nf 1 2 3\no painted\nf 1/1 2/1 3/1\no mixed\n\
+        usemtl a\nf 1/1 2 3\nusemtl b\nf 1 2 3\nusemtl a\nf 3/1 2/1 1/1\n";
+    folder.write("mesh.obj", text);
+    let scene = folder.load("mesh.obj").unwrap();
+    let uvs: Vec<_> = scene.meshes.iter().map(|mesh| (mesh.name.as_str(), mesh.uvs.len())).collect();
+    assert_eq!(&uvs[..2], [("mesh.obj (plain)", 0), ("mesh.obj (painted)", 3)]);
+    assert!(scene.meshes.iter().all(|mesh| mesh.uvs.is_empty() || mesh.uvs.len() == mesh.positions.len()));
+}
+
+#[test]
 fn polygons_groups_and_materials_become_triangles_and_parts() {
     let folder = Folder::new();
     let quad = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0.5 2 0\n";
@@ -92,10 +159,17 @@ fn polygons_groups_and_materials_become_triangles_and_parts() {
 
 /// What the MTL with these lines makes of a body, and what is said about it.
 fn from_mtl(folder: &Folder, lines: &str) -> (Surface, Vec<String>) {
-    folder.write("m.mtl", format!("newmtl m\n{lines}\n"));
-    folder.write("mtl.obj", format!("mtllib m.mtl\nusemtl m\n{TETRAHEDRON}"));
-    let scene = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"mtl.obj\"\n").unwrap();
+    let scene = with_mtl(folder, lines);
     (scene.materials[scene.objects[0].material].surface.clone(), scene.warnings)
+}
+
+fn with_mtl(folder: &Folder, lines: &str) -> Scene {
+    folder.write("m.mtl", format!("newmtl m\n{lines}\n"));
+    let body = TETRAHEDRON.replace("f 1 ", "f 1/1 ");
+    folder.write("mtl.obj", format!("mtllib m.mtl\nusemtl m\nvt 0 0\n{body}"));
+    let mut scene = folder.scene("[environment]\ncolor = [1, 1, 1]\n[[object]]\nmesh = \"mtl.obj\"\n").unwrap();
+    scene.warnings.retain(|warning| !warning.contains("texture coordinates"));
+    scene
 }
 
 #[test]
@@ -139,18 +213,17 @@ fn mtl_values_are_converted_or_remarked_on() {
 
     fs::create_dir(folder.path("tex")).unwrap();
     fs::copy(folder.path("sky.png"), folder.path("tex/my sky.png")).unwrap();
-    let (surface, warnings) =
-        from_mtl(&folder, "Kd 0.5\nPm 1\nPr 0.25\nKe 1 2 3\nmap_Kd -s 1 1 1 -clamp on tex\\my sky.png");
-    let texture = folder.0.path().join("tex/my sky.png");
+    let scene = with_mtl(&folder, "Kd 0.5\nPm 1\nPr 0.25\nKe 1 2 3\nmap_Kd -s 1 1 1 -clamp on tex\\my sky.png");
+    assert_eq!(scene.textures[0].path, folder.path("tex/my sky.png"));
     let expected = Opaque {
         base_color: DVec3::splat(0.5),
-        base_color_texture: Some(texture),
+        base_color_texture: Some(0),
         metallic: 1.0,
         roughness: 0.25,
         specular: 1.0,
         emission: DVec3::new(1.0, 2.0, 3.0),
     };
-    assert_eq!((surface, warnings.len()), (Surface::Opaque(expected), 0));
+    assert_eq!((opaque(&scene, 0), scene.warnings.len()), (&expected, 0));
 
     let (surface, warnings) = from_mtl(&folder, "Kd 0 1 0\nmap_Kd none.png");
     assert!(
