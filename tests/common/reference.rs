@@ -7,7 +7,7 @@ use glam::{DVec2, DVec3};
 
 use vitrum::optics::original;
 use vitrum::options::Size;
-use vitrum::scene::{Scene, Surface, Surroundings};
+use vitrum::scene::{Environment, Scene, Surface, Surroundings};
 
 /// What a ray meets first.
 #[derive(Clone, Copy, Debug)]
@@ -31,6 +31,27 @@ pub struct Reference<'a> {
     scene: &'a Scene,
     size: Size,
     triangles: Vec<Triangle>,
+}
+
+/// Radiance that `environment` sends from `direction`, bilinear between texels.
+pub fn environment_radiance(environment: &Environment, direction: DVec3) -> DVec3 {
+    let panorama = match &environment.light {
+        Surroundings::Color(color) => return *color * environment.intensity,
+        Surroundings::Image(panorama) => panorama,
+    };
+    let d = direction.normalize();
+    let u = (d.x.atan2(-d.z) + environment.rotation) / TAU;
+    let v = d.y.clamp(-1.0, 1.0).acos() / PI;
+    let (width, height) = (i64::from(panorama.width), i64::from(panorama.height));
+    let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
+    let texel = |column: f64, row: f64| {
+        let column = (column as i64).rem_euclid(width);
+        let row = (row as i64).clamp(0, height - 1);
+        DVec3::from_array(panorama.texels[(row * width + column) as usize].map(f64::from))
+    };
+    let (left, top) = (x.floor(), y.floor());
+    let across = |row| texel(left, row).lerp(texel(left + 1.0, row), x - left);
+    across(top).lerp(across(top + 1.0), y - top) * environment.intensity
 }
 
 impl<'a> Reference<'a> {
@@ -101,24 +122,7 @@ impl<'a> Reference<'a> {
 
     /// Radiance of the environment, bilinear between texels.
     pub fn environment(&self, direction: DVec3) -> DVec3 {
-        let environment = &self.scene.environment;
-        let panorama = match &environment.light {
-            Surroundings::Color(color) => return *color * environment.intensity,
-            Surroundings::Image(panorama) => panorama,
-        };
-        let d = direction.normalize();
-        let u = (d.x.atan2(-d.z) + environment.rotation) / TAU;
-        let v = d.y.clamp(-1.0, 1.0).acos() / PI;
-        let (width, height) = (i64::from(panorama.width), i64::from(panorama.height));
-        let (x, y) = (u * width as f64 - 0.5, v * height as f64 - 0.5);
-        let texel = |column: f64, row: f64| {
-            let column = (column as i64).rem_euclid(width);
-            let row = (row as i64).clamp(0, height - 1);
-            DVec3::from_array(panorama.texels[(row * width + column) as usize].map(f64::from))
-        };
-        let (left, top) = (x.floor(), y.floor());
-        let across = |row| texel(left, row).lerp(texel(left + 1.0, row), x - left);
-        across(top).lerp(across(top + 1.0), y - top) * environment.intensity
+        environment_radiance(&self.scene.environment, direction)
     }
 
     /// Light that a surface sends to the viewer.
