@@ -41,7 +41,7 @@ pub struct PassTime {
 /// What recordings need: a pool, a fence, timestamps. One recording executes at a time.
 pub struct Commands {
     pool: vk::CommandPool,
-    buffer: vk::CommandBuffer,
+    pub(super) buffer: vk::CommandBuffer,
     fence: vk::Fence,
     queries: vk::QueryPool,
     gpu: Gpu,
@@ -214,7 +214,7 @@ impl Drop for Commands {
 
 /// A recording under way, of things borrowed for `'r`.
 pub struct Recorder<'a, 'r> {
-    commands: &'a Commands,
+    pub(super) commands: &'a Commands,
     timed: Vec<&'static str>,
     recorded: PhantomData<&'r ()>,
 }

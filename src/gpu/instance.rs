@@ -12,7 +12,7 @@ use super::{GpuError, Result};
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
 /// What a device with ray queries has.
-const RAY_QUERY_EXTENSIONS: [&CStr; 3] = [
+pub(super) const RAY_QUERY_EXTENSIONS: [&CStr; 3] = [
     ash::khr::acceleration_structure::NAME,
     ash::khr::ray_query::NAME,
     // The first needs it.
@@ -75,12 +75,24 @@ impl fmt::Display for DeviceKind {
     }
 }
 
+/// How large acceleration structures may be; zeros where a device has none.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct AccelerationLimits {
+    /// Triangles of one mesh.
+    pub(super) triangles: u64,
+    /// Meshes in their places.
+    pub(super) instances: u64,
+    /// Alignment of the memory that a build works in.
+    pub(super) scratch_alignment: u64,
+}
+
 /// A device found, and what it can do.
 #[derive(Clone, Debug)]
 pub struct DeviceInfo {
     pub(super) handle: vk::PhysicalDevice,
     pub(super) queue_family: u32,
     pub(super) limits: vk::PhysicalDeviceLimits,
+    pub(super) acceleration: AccelerationLimits,
     pub(super) timestamp_bits: u32,
     /// Position in the list of devices, for `--device`.
     pub index: usize,
@@ -227,6 +239,7 @@ impl Instance {
         let rays = RAY_QUERY_EXTENSIONS.into_iter().all(has);
 
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
         let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
@@ -234,6 +247,7 @@ impl Instance {
         let mut ray_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
         let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13).push_next(&mut vulkan12);
         if rays {
+            properties = properties.push_next(&mut limits);
             features = features.push_next(&mut acceleration).push_next(&mut ray_query);
         }
         // SAFETY: `handle` was enumerated from this instance. A device older than 1.3 ignores structs that it does not know,
@@ -256,6 +270,11 @@ impl Instance {
             handle,
             queue_family: queue_family.unwrap_or(0) as u32,
             limits: properties.limits,
+            acceleration: AccelerationLimits {
+                triangles: limits.max_primitive_count,
+                instances: limits.max_instance_count,
+                scratch_alignment: limits.min_acceleration_structure_scratch_offset_alignment.into(),
+            },
             timestamp_bits: queue_family.map_or(0, |family| families[family].timestamp_valid_bits),
             index,
             name: text(properties.device_name_as_c_str()),
