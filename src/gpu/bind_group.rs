@@ -5,7 +5,7 @@ use std::sync::Arc;
 use ash::vk;
 
 use super::error::Context;
-use super::{Buffer, Gpu, Image, Result};
+use super::{AccelerationStructure, Buffer, Gpu, Image, Result};
 
 /// A resource at one binding; its position in the list is the binding's number.
 #[derive(Clone)]
@@ -16,6 +16,8 @@ pub enum Bind {
     Sampled(Arc<Image>),
     /// An image that shaders read and write.
     Storage(Arc<Image>),
+    /// What ray queries look into.
+    Acceleration(Arc<AccelerationStructure>),
 }
 
 impl Bind {
@@ -24,6 +26,7 @@ impl Bind {
             Self::Buffer(_) => vk::DescriptorType::STORAGE_BUFFER,
             Self::Sampled(_) => vk::DescriptorType::SAMPLED_IMAGE,
             Self::Storage(_) => vk::DescriptorType::STORAGE_IMAGE,
+            Self::Acceleration(_) => vk::DescriptorType::ACCELERATION_STRUCTURE_KHR,
         }
     }
 }
@@ -101,6 +104,12 @@ impl BindGroup {
                     update(write.image_info(&image(sampled, vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)));
                 }
                 Bind::Storage(storage) => update(write.image_info(&image(storage, vk::ImageLayout::GENERAL))),
+                Bind::Acceleration(structure) => {
+                    let handles = [structure.handle()];
+                    let mut info =
+                        vk::WriteDescriptorSetAccelerationStructureKHR::default().acceleration_structures(&handles);
+                    update(write.descriptor_count(1).push_next(&mut info));
+                }
             }
         }
     }

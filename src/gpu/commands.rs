@@ -16,6 +16,19 @@ use super::{
 /// Passes that one recording can time.
 const MAX_TIMED: u32 = 64;
 
+/// Stages, and what they do to memory.
+pub(super) type Accesses = (vk::PipelineStageFlags2, vk::AccessFlags2);
+
+/// What writes into buffers.
+pub(super) const BUFFER_WRITES: Accesses = (
+    vk::PipelineStageFlags2::from_raw(
+        vk::PipelineStageFlags2::COMPUTE_SHADER.as_raw() | vk::PipelineStageFlags2::COPY.as_raw(),
+    ),
+    vk::AccessFlags2::from_raw(
+        vk::AccessFlags2::SHADER_STORAGE_WRITE.as_raw() | vk::AccessFlags2::TRANSFER_WRITE.as_raw(),
+    ),
+);
+
 /// How long a pass took on the device.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PassTime {
@@ -28,7 +41,7 @@ pub struct PassTime {
 /// What recordings need: a pool, a fence, timestamps. One recording executes at a time.
 pub struct Commands {
     pool: vk::CommandPool,
-    buffer: vk::CommandBuffer,
+    pub(super) buffer: vk::CommandBuffer,
     fence: vk::Fence,
     queries: vk::QueryPool,
     gpu: Gpu,
@@ -201,7 +214,7 @@ impl Drop for Commands {
 
 /// A recording under way, of things borrowed for `'r`.
 pub struct Recorder<'a, 'r> {
-    commands: &'a Commands,
+    pub(super) commands: &'a Commands,
     timed: Vec<&'static str>,
     recorded: PhantomData<&'r ()>,
 }
@@ -359,13 +372,21 @@ impl<'r> Recorder<'_, 'r> {
     /// Makes what shaders wrote into buffers visible to copies, and what was copied visible to shaders.
     pub fn wait_for_buffers(&mut self) {
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
+        self.memory_barrier(
+            BUFFER_WRITES,
+            (Stage::ALL_COMMANDS, Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE | Access::TRANSFER_READ),
+        );
+    }
+
+    /// Lets what comes `after` wait for what was `before`, and see what that wrote.
+    pub(super) fn memory_barrier(&mut self, before: Accesses, after: Accesses) {
         let barriers = [vk::MemoryBarrier2::default()
-            .src_stage_mask(Stage::COMPUTE_SHADER | Stage::COPY)
-            .src_access_mask(Access::SHADER_STORAGE_WRITE | Access::TRANSFER_WRITE)
-            .dst_stage_mask(Stage::ALL_COMMANDS)
-            .dst_access_mask(Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE | Access::TRANSFER_READ)];
+            .src_stage_mask(before.0)
+            .src_access_mask(before.1)
+            .dst_stage_mask(after.0)
+            .dst_access_mask(after.1)];
         let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
-        // SAFETY: a barrier names no resource.
+        // SAFETY: a barrier of memory names no resource.
         unsafe { self.device().cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
     }
 
@@ -400,14 +421,10 @@ impl<'r> Recorder<'_, 'r> {
     }
 
     fn make_visible_to_host(&mut self) {
-        let barriers = [vk::MemoryBarrier2::default()
-            .src_stage_mask(vk::PipelineStageFlags2::COPY)
-            .src_access_mask(vk::AccessFlags2::TRANSFER_WRITE)
-            .dst_stage_mask(vk::PipelineStageFlags2::HOST)
-            .dst_access_mask(vk::AccessFlags2::HOST_READ)];
-        let dependency = vk::DependencyInfo::default().memory_barriers(&barriers);
-        // SAFETY: a barrier names no resource.
-        unsafe { self.device().cmd_pipeline_barrier2(self.commands.buffer, &dependency) };
+        self.memory_barrier(
+            (vk::PipelineStageFlags2::COPY, vk::AccessFlags2::TRANSFER_WRITE),
+            (vk::PipelineStageFlags2::HOST, vk::AccessFlags2::HOST_READ),
+        );
     }
 }
 

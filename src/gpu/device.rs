@@ -5,11 +5,12 @@ use std::mem::ManuallyDrop;
 use std::ops::Deref;
 use std::sync::{Arc, Mutex};
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use gpu_allocator::AllocationSizes;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 
 use super::error::Context;
+use super::instance::RAY_QUERY_EXTENSIONS;
 use super::memory::Ledger;
 use super::{DeviceInfo, GpuError, Instance, Result};
 
@@ -24,6 +25,8 @@ pub struct Open {
     pub(super) queue: Mutex<vk::Queue>,
     pub(super) allocator: ManuallyDrop<Mutex<Allocator>>,
     pub(super) ledger: Mutex<Ledger>,
+    /// The functions of acceleration structures, where there are ray queries.
+    acceleration: Option<khr::acceleration_structure::Device>,
     names: Option<ext::debug_utils::Device>,
     info: DeviceInfo,
     /// Held so that it outlives the device.
@@ -39,7 +42,7 @@ impl Deref for Gpu {
 }
 
 impl Gpu {
-    /// Opens the device that was [chosen](Instance::choose).
+    /// Opens the device that was [chosen](Instance::choose), with ray queries if it has them.
     pub fn open(instance: &Arc<Instance>, info: DeviceInfo) -> Result<Self> {
         let priorities = [1.0];
         let queues =
@@ -54,11 +57,17 @@ impl Gpu {
         // A device that is not a full Vulkan implementation says so, and wants it to be acknowledged.
         const PORTABILITY: &CStr = ash::khr::portability_subset::NAME;
         let subset = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(PORTABILITY));
-        let enabled = if subset { vec![PORTABILITY.as_ptr()] } else { Vec::new() };
-        let create = vk::DeviceCreateInfo::default()
-            .queue_create_infos(&queues)
-            .enabled_extension_names(&enabled)
-            .push_next(&mut vulkan13);
+        let mut enabled = if subset { vec![PORTABILITY.as_ptr()] } else { Vec::new() };
+        let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(true);
+        let mut acceleration =
+            vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+        let mut ray_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+        let mut create = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut vulkan13);
+        if info.ray_query {
+            enabled.extend(RAY_QUERY_EXTENSIONS.map(CStr::as_ptr));
+            create = create.push_next(&mut vulkan12).push_next(&mut acceleration).push_next(&mut ray_query);
+        }
+        let create = create.enabled_extension_names(&enabled);
         // SAFETY: the features and the queue family were found on this device; the pointers are to locals.
         let device = unsafe { instance.handle.create_device(info.handle, &create, None) }.context("vkCreateDevice")?;
         // SAFETY: queue 0 of that family was just created.
@@ -70,7 +79,7 @@ impl Gpu {
             device: device.clone(),
             physical_device: info.handle,
             debug_settings: Default::default(),
-            buffer_device_address: false,
+            buffer_device_address: info.ray_query,
             // Small blocks: on a CPU device they are the process's own memory.
             allocation_sizes: AllocationSizes::new(8 * MIB, 8 * MIB).with_max_device_memblock_size(64 * MIB),
         });
@@ -82,12 +91,14 @@ impl Gpu {
                 return Err(GpuError::OutOfMemory { what: "the allocator".into(), state: error.to_string() });
             }
         };
+        let acceleration = info.ray_query.then(|| khr::acceleration_structure::Device::new(&instance.handle, &device));
         let names = instance.validates().then(|| ext::debug_utils::Device::new(&instance.handle, &device));
         Ok(Self(Arc::new(Open {
             device,
             queue: Mutex::new(queue),
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             ledger: Mutex::default(),
+            acceleration,
             names,
             info,
             _instance: Arc::clone(instance),
@@ -97,6 +108,17 @@ impl Gpu {
     /// What is known of the device.
     pub fn info(&self) -> &DeviceInfo {
         &self.info
+    }
+
+    /// Shaders can query rays, and [`AccelerationStructure`](super::AccelerationStructure)s can be built.
+    pub fn ray_query(&self) -> bool {
+        self.info.ray_query
+    }
+
+    /// The functions of acceleration structures; an error on a device without ray queries.
+    pub(super) fn acceleration(&self) -> Result<&khr::acceleration_structure::Device> {
+        let lacking = || GpuError::Lacking { name: self.info.name.clone(), missing: vec!["ray queries".into()] };
+        self.acceleration.as_ref().ok_or_else(lacking)
     }
 
     /// The most bytes of device memory that were held at one time.

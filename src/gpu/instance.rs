@@ -11,6 +11,14 @@ use super::{GpuError, Result};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
 
+/// What a device with ray queries has.
+pub(super) const RAY_QUERY_EXTENSIONS: [&CStr; 3] = [
+    ash::khr::acceleration_structure::NAME,
+    ash::khr::ray_query::NAME,
+    // The first needs it.
+    ash::khr::deferred_host_operations::NAME,
+];
+
 /// What the validation layer has said.
 #[derive(Debug, Default)]
 pub struct Messages(Mutex<Vec<String>>);
@@ -67,12 +75,24 @@ impl fmt::Display for DeviceKind {
     }
 }
 
+/// How large acceleration structures may be; zeros where a device has none.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct AccelerationLimits {
+    /// Triangles of one mesh.
+    pub(super) triangles: u64,
+    /// Meshes in their places.
+    pub(super) instances: u64,
+    /// Alignment of the memory that a build works in.
+    pub(super) scratch_alignment: u64,
+}
+
 /// A device found, and what it can do.
 #[derive(Clone, Debug)]
 pub struct DeviceInfo {
     pub(super) handle: vk::PhysicalDevice,
     pub(super) queue_family: u32,
     pub(super) limits: vk::PhysicalDeviceLimits,
+    pub(super) acceleration: AccelerationLimits,
     pub(super) timestamp_bits: u32,
     /// Position in the list of devices, for `--device`.
     pub index: usize,
@@ -88,7 +108,7 @@ pub struct DeviceInfo {
     pub memory: u64,
     /// The rasteriser snaps vertices to 2^-this of a pixel.
     pub sub_pixel_bits: u32,
-    /// `VK_KHR_acceleration_structure` and `VK_KHR_ray_query` are there.
+    /// Shaders can query rays: `VK_KHR_acceleration_structure`, `VK_KHR_ray_query` and their features are there.
     pub ray_query: bool,
     /// What Vitrum needs and it lacks; empty: it can be used.
     pub missing: Vec<String>,
@@ -211,25 +231,36 @@ impl Instance {
     }
 
     fn inspect(&self, index: usize, handle: vk::PhysicalDevice) -> DeviceInfo {
+        // SAFETY: `handle` was enumerated from this instance.
+        let extensions = unsafe { self.handle.enumerate_device_extension_properties(handle) };
+        // A device that cannot list its extensions has none that matter.
+        let extensions = extensions.unwrap_or_default();
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let rays = RAY_QUERY_EXTENSIONS.into_iter().all(has);
+
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
         let mut vulkan13 = vk::PhysicalDeviceVulkan13Features::default();
-        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13);
+        let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default();
+        let mut acceleration = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
+        let mut ray_query = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+        let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut vulkan13).push_next(&mut vulkan12);
+        if rays {
+            properties = properties.push_next(&mut limits);
+            features = features.push_next(&mut acceleration).push_next(&mut ray_query);
+        }
         // SAFETY: `handle` was enumerated from this instance. A device older than 1.3 ignores structs that it does not know,
         // and what stays false then reads as missing.
-        let (families, memory, depth, extensions) = unsafe {
+        let (families, memory, depth) = unsafe {
             self.handle.get_physical_device_properties2(handle, &mut properties);
             self.handle.get_physical_device_features2(handle, &mut features);
             (
                 self.handle.get_physical_device_queue_family_properties(handle),
                 self.handle.get_physical_device_memory_properties(handle),
                 self.handle.get_physical_device_format_properties(handle, vk::Format::D32_SFLOAT),
-                self.handle.enumerate_device_extension_properties(handle),
             )
         };
-        // A device that cannot list its extensions has none that matter.
-        let extensions = extensions.unwrap_or_default();
-        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let properties = properties.properties;
         let work = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
         let queue_family = families.iter().position(|family| family.queue_flags.contains(work));
@@ -239,6 +270,11 @@ impl Instance {
             handle,
             queue_family: queue_family.unwrap_or(0) as u32,
             limits: properties.limits,
+            acceleration: AccelerationLimits {
+                triangles: limits.max_primitive_count,
+                instances: limits.max_instance_count,
+                scratch_alignment: limits.min_acceleration_structure_scratch_offset_alignment.into(),
+            },
             timestamp_bits: queue_family.map_or(0, |family| families[family].timestamp_valid_bits),
             index,
             name: text(properties.device_name_as_c_str()),
@@ -253,7 +289,9 @@ impl Instance {
             },
             memory: memory.memory_heaps_as_slice().iter().map(|heap| heap.size).max().unwrap_or(0),
             sub_pixel_bits: properties.limits.sub_pixel_precision_bits,
-            ray_query: has(ash::khr::acceleration_structure::NAME) && has(ash::khr::ray_query::NAME),
+            // Without the extensions the first two were not asked for, and are false.
+            ray_query: [acceleration.acceleration_structure, ray_query.ray_query, vulkan12.buffer_device_address]
+                == [vk::TRUE; 3],
             missing: missing(
                 properties.api_version,
                 &vulkan13,

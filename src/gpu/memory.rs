@@ -79,12 +79,16 @@ fn out_of_memory(name: &str, size: u64, state: String) -> GpuError {
 /// What a buffer is for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BufferUse {
-    /// Read and written by shaders.
+    /// Read and written by shaders; on devices with ray queries also by builds of acceleration structures.
     Storage,
     /// Written by the host, copied from by the device.
     Upload,
     /// Copied to by the device, read by the host.
     Readback,
+    /// Holds an acceleration structure; on devices with ray queries.
+    Acceleration,
+    /// Worked in while an acceleration structure is built; on devices with ray queries.
+    Scratch,
 }
 
 /// How a buffer is made.
@@ -125,9 +129,21 @@ impl Buffer {
             if gpu.info().kind == super::DeviceKind::Cpu { MemoryLocation::CpuToGpu } else { MemoryLocation::GpuOnly };
         use vk::BufferUsageFlags as Flags;
         let (flags, location) = match desc.usage {
-            BufferUse::Storage => (Flags::STORAGE_BUFFER | Flags::TRANSFER_DST | Flags::TRANSFER_SRC, near),
+            BufferUse::Storage => {
+                let input = Flags::SHADER_DEVICE_ADDRESS | Flags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR;
+                let input = if gpu.ray_query() { input } else { Flags::empty() };
+                (Flags::STORAGE_BUFFER | Flags::TRANSFER_DST | Flags::TRANSFER_SRC | input, near)
+            }
             BufferUse::Upload => (Flags::TRANSFER_SRC, MemoryLocation::CpuToGpu),
             BufferUse::Readback => (Flags::TRANSFER_DST, MemoryLocation::GpuToCpu),
+            BufferUse::Acceleration => {
+                gpu.acceleration()?;
+                (Flags::ACCELERATION_STRUCTURE_STORAGE_KHR | Flags::SHADER_DEVICE_ADDRESS, near)
+            }
+            BufferUse::Scratch => {
+                gpu.acceleration()?;
+                (Flags::STORAGE_BUFFER | Flags::SHADER_DEVICE_ADDRESS, near)
+            }
         };
         let info = vk::BufferCreateInfo::default().size(size).usage(flags);
         // SAFETY: the device is alive; the size is not 0.
@@ -136,7 +152,11 @@ impl Buffer {
         let mut buffer = Self { handle, size, usage: desc.usage, allocation: None, gpu: gpu.clone() };
         gpu.name(handle, desc.name);
         // SAFETY: the buffer was just made on this device.
-        let requirements = unsafe { gpu.device.get_buffer_memory_requirements(handle) };
+        let mut requirements = unsafe { gpu.device.get_buffer_memory_requirements(handle) };
+        if gpu.ray_query() {
+            // Builds of acceleration structures read placed meshes at multiples of 16.
+            requirements.alignment = requirements.alignment.max(16);
+        }
         let allocation = gpu.allocate(desc.name, requirements, location, /* linear: */ true)?;
         // SAFETY: memory and offset come from the allocator for these very requirements; bound once, and kept until the
         // buffer is destroyed.
@@ -149,6 +169,19 @@ impl Buffer {
     /// Size in bytes.
     pub fn size(&self) -> u64 {
         self.size
+    }
+
+    /// Where builds of acceleration structures find it.
+    ///
+    /// # Panics
+    ///
+    /// If it was made for something else, or on a device without ray queries.
+    pub(super) fn address(&self) -> vk::DeviceAddress {
+        let found = matches!(self.usage, BufferUse::Storage | BufferUse::Scratch) && self.gpu.ray_query();
+        assert!(found, "a buffer for {:?} without an address", self.usage);
+        let info = vk::BufferDeviceAddressInfo::default().buffer(self.handle);
+        // SAFETY: the buffer was made with SHADER_DEVICE_ADDRESS, see `new`, and is bound to memory.
+        unsafe { self.gpu.device.get_buffer_device_address(&info) }
     }
 
     /// Writes from the start; false if the host cannot see this memory.

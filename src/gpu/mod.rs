@@ -1,10 +1,12 @@
 //! Vulkan 1.3 behind a safe face: the only room of the house with `unsafe`.
 //!
-//! In flow descriptions and bytes, out flow bytes and times. [`Instance`] finds devices, [`Gpu`] is one of them opened;
-//! [`Buffer`], [`Image`], [`BindGroup`] and the pipelines live on it, and [`Commands`] records, submits and waits.
-//! Everything holds its [`Gpu`], so no device goes before what was made on it, and [`Commands::run`] returns only when the
-//! device is done, so nothing that a recording borrows can go while it is in use.
+//! In flow descriptions and bytes, out flow bytes and times. [`Instance`] finds devices, [`Gpu`] is one of them
+//! opened; [`Buffer`], [`Image`], [`AccelerationStructure`], [`BindGroup`] and the pipelines live on it, and
+//! [`Commands`] records, submits and waits. Everything holds its [`Gpu`], so no device goes before what was made on
+//! it, and [`Commands::run`] returns only when the device is done, so nothing that a recording borrows can go while
+//! it is in use.
 
+mod acceleration;
 mod bind_group;
 mod commands;
 mod device;
@@ -16,6 +18,7 @@ mod pipeline;
 mod shader;
 mod shared;
 
+pub use acceleration::{AccelerationStructure, PlacedMesh};
 pub use bind_group::{Bind, BindGroup};
 pub use commands::{Commands, PassTime, Recorder, RenderPass, Sides, Target};
 pub use device::Gpu;
