@@ -108,9 +108,7 @@ impl Plan {
         let model = args.model.unwrap_or(Model::Single);
         let has: &[Aov] = match model {
             Model::Single => &[Aov::Normal, Aov::Depth, Aov::Object],
-            Model::Tree => {
-                &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded]
-            }
+            Model::Tree => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded],
             Model::Double | Model::Path => {
                 let name = model.name();
                 return Err(Error::Usage(format!(

@@ -45,7 +45,9 @@ pub enum GpuError {
     },
 
     /// Ray queries were asked for and the device has none.
-    #[error("--trace hardware: device {name:?} has no ray queries; use --trace software, or choose another with --device")]
+    #[error(
+        "--trace hardware: device {name:?} has no ray queries; use --trace software, or choose another with --device"
+    )]
     NoRayQuery {
         /// The device.
         name: String,

@@ -29,9 +29,8 @@ pub(super) struct Bvh {
 impl Bvh {
     /// Over triangles, of which there is at least one.
     pub(super) fn of_triangles(corners: impl Iterator<Item = [[f32; 3]; 3]>) -> Self {
-        let triangles: Vec<_> = corners
-            .map(|[a, b, c]| Triangle { v0: Vec3A::from(a), v1: Vec3A::from(b), v2: Vec3A::from(c) })
-            .collect();
+        let triangles: Vec<_> =
+            corners.map(|[a, b, c]| Triangle { v0: Vec3A::from(a), v1: Vec3A::from(b), v2: Vec3A::from(c) }).collect();
         Self::new(build_cwbvh_from_tris(&triangles, BvhBuildParams::medium_build(), &mut Duration::default()))
     }
 

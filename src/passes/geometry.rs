@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::bvh::{Bvh, Node};
 use super::view::View;
-use crate::gpu::{InstanceRecord, Sides};
+use crate::gpu::{InstanceRecord, PlacedMesh, Sides};
 use crate::options::Trace;
 use crate::scene::{Bounds, Mesh, Object, Scene, Surface};
 
@@ -25,10 +25,14 @@ pub(super) struct Geometry {
     pub(super) triangles: Vec<u32>,
     pub(super) instances: Vec<InstanceRecord>,
     pub(super) draws: Vec<Draw>,
+    /// Texture coordinates, as the mesh has them.
+    pub(super) uvs: Vec<f32>,
     /// For tracing: the corners of each triangle, in the order of the triangles.
     pub(super) corners: Vec<f32>,
     /// For tracing in software: the hierarchy over the instances, then one a mesh.
     pub(super) nodes: Vec<Node>,
+    /// For tracing in hardware: the meshes in their places.
+    pub(super) placed: Vec<PlacedMesh>,
     /// The triangles of each mesh.
     pub(super) meshes: Vec<Range<u32>>,
     /// The most groups of nodes that wait while the tracer goes down through both levels.
@@ -84,6 +88,9 @@ impl Geometry {
                 rank: ranks[number],
                 mesh: object.mesh as u32,
             });
+            if trace == Some(Trace::Hardware) {
+                all.placed.push(PlacedMesh { mesh: object.mesh, object_to_world });
+            }
             all.draws.push(Draw {
                 vertices: 3 * mesh.triangles.len() as u32,
                 sides: Sides {
@@ -117,6 +124,12 @@ impl Geometry {
             // Never read, but vertices share one numbering.
             true => self.normals.resize(self.positions.len(), 0.0),
             false => self.normals.extend(mesh.normals.iter().flatten()),
+        }
+        if trace.is_some() {
+            match mesh.uvs.is_empty() {
+                true => self.uvs.resize(self.positions.len() / 3 * 2, 0.0),
+                false => self.uvs.extend(mesh.uvs.iter().flatten()),
+            }
         }
         let corners = |&triangle: &[u32; 3]| triangle.map(|vertex| units[vertex as usize]);
         let mut triangles = mesh.triangles.clone();

@@ -10,15 +10,17 @@ use super::geometry::{Draw, Geometry};
 use super::view::View;
 use crate::effects::{Effect, SMOOTH};
 use crate::gpu::{
-    Bind, BindGroup, Commands, Format, Frame, Gpu, GpuError, Image, ImageDesc, LightRecord, MaterialRecord, Result,
-    Specialization, Use,
+    AccelerationStructure, Bind, BindGroup, Commands, Format, Frame, Gpu, GpuError, Image, ImageDesc, LightRecord,
+    MaterialRecord, Result, Specialization, Use,
 };
 use crate::optics::compensation::AlbedoTable;
 use crate::optics::medium::absorption;
 use crate::optics::rough::RoughInterface;
-use crate::plan::{Budget, Plan};
 use crate::options::Trace;
-use crate::scene::{Dielectric, Material, Opaque, Panorama, Scene, Surface, Surroundings};
+use crate::plan::{Budget, Plan};
+use crate::scene::{
+    Dielectric, Dispersion, Material, Opaque, Panorama, Scene, Sellmeier, Surface, Surroundings, Texels, Texture,
+};
 
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
@@ -45,7 +47,7 @@ impl Resources {
         let view = View::new(&scene.camera, scene.bounds(), plan.size);
         let start = Instant::now();
         let geometry = Geometry::new(scene, &view, trace);
-        let acceleration = trace.map(|_| start.elapsed());
+        let mut acceleration = start.elapsed();
         if geometry.depth > TRACE_STACK {
             return Err(GpuError::TooLarge {
                 what: "the depth of the hierarchy over the triangles".into(),
@@ -69,6 +71,7 @@ impl Resources {
             ..frame(scene, plan, &view, lights.len() as u32)
         };
         let ranked = ranked_materials(scene, &geometry);
+        let texels = if plan.effects.contains(Effect::Textures) { texels(&scene.textures) } else { Vec::new() };
         let buffers = vec![
             commands.upload_buffer("frame", &[frame])?,
             commands.upload_buffer("instances", &geometry.instances)?,
@@ -86,11 +89,20 @@ impl Resources {
         let mut traced = Vec::new();
         if trace.is_some() {
             traced.clone_from(&bindings);
-            traced.push(buffer(commands.upload_buffer("nodes of the hierarchies", &geometry.nodes)?));
-            traced.push(buffer(commands.upload_buffer("corners of the triangles", &geometry.corners)?));
+            let corners = commands.upload_buffer("corners of the triangles", &geometry.corners)?;
+            let start = Instant::now();
+            traced.push(match trace {
+                Some(Trace::Hardware) => {
+                    let built = AccelerationStructure::new(commands, &corners, &geometry.meshes, &geometry.placed)?;
+                    acceleration += start.elapsed();
+                    Bind::Acceleration(Arc::new(built))
+                }
+                _ => buffer(commands.upload_buffer("nodes of the hierarchies", &geometry.nodes)?),
+            });
+            traced.push(buffer(corners));
             traced.push(buffer(commands.upload_buffer("materials of the bodies", &ranked)?));
-            traced.push(buffer(commands.upload_buffer("texture coordinates", &[0.0_f32])?));
-            traced.push(buffer(commands.upload_buffer("texels", &[0_u32])?));
+            traced.push(buffer(commands.upload_buffer("texture coordinates", &geometry.uvs)?));
+            traced.push(buffer(commands.upload_buffer("texels", &texels)?));
         }
         Ok(Self {
             group: BindGroup::new(commands.gpu(), "scene", bindings)?,
@@ -98,7 +110,7 @@ impl Resources {
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects).with(ENVIRONMENT_IMAGE, specialization),
             metres_per_unit: 1.0 / view.units_per_metre,
-            acceleration,
+            acceleration: trace.map(|_| acceleration),
         })
     }
 }
@@ -127,6 +139,10 @@ fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<MaterialRecord>, V
             };
         }
         // Infinite where a colour is 0: so dark that nothing is left after a millionth of the scene.
+        let formula = match glass.dispersion {
+            Dispersion::Sellmeier(formula) => formula,
+            Dispersion::None | Dispersion::Khr(_) => Sellmeier { strengths: [0.0; 3], resonances: [0.0; 3] },
+        };
         let per_unit = |color| (absorption(color, glass.attenuation_distance) / view.units_per_metre).min(1e8) as f32;
         let [r, g, b] = glass.attenuation_color.to_array().map(per_unit);
         MaterialRecord {
@@ -134,13 +150,25 @@ fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<MaterialRecord>, V
             refraction_index: ior as f32,
             base_color: Vec3::ONE,
             roughness: roughness as f32,
-            dispersion: glass.dispersion as f32,
+            dispersion: dispersion(glass),
+            sellmeier_strengths: formula.strengths.map(|x| x as f32).into(),
+            sellmeier_resonances: formula.resonances.map(|x| x as f32).into(),
             kind: if glass.thin_walled { MaterialRecord::PANE } else { MaterialRecord::DIELECTRIC },
             albedo_table,
             ..MaterialRecord::default()
         }
     };
     (scene.materials.iter().map(record).collect(), albedos)
+}
+
+/// As `shaders/shared.glsl` tells the laws apart.
+fn dispersion(glass: &Dielectric) -> f32 {
+    match glass.dispersion {
+        _ if glass.thin_walled || !glass.disperses() => 0.0,
+        Dispersion::None => 0.0,
+        Dispersion::Khr(number) => number as f32,
+        Dispersion::Sellmeier(_) => -1.0,
+    }
 }
 
 fn opaque_record(opaque: &Opaque) -> MaterialRecord {
@@ -151,8 +179,32 @@ fn opaque_record(opaque: &Opaque) -> MaterialRecord {
         metallic: opaque.metallic as f32,
         specular: opaque.specular as f32,
         kind: MaterialRecord::OPAQUE,
+        texture: opaque.base_color_texture.map_or(0, |texture| texture as u32 + 1),
         ..MaterialRecord::default()
     }
+}
+
+/// All textures in one buffer: where each starts, its width and its height, then the texels, 8 bits a channel as sRGB.
+fn texels(textures: &[Texture]) -> Vec<u32> {
+    let mut words = vec![0; 3 * textures.len()];
+    for (number, texture) in textures.iter().enumerate() {
+        let header = [words.len() as u32, texture.width, texture.height];
+        words[3 * number..][..3].copy_from_slice(&header);
+        match &texture.texels {
+            Texels::Srgb(texels) => words.extend(texels.iter().map(|&texel| u32::from_le_bytes(texel))),
+            Texels::Linear(texels) => words.extend(texels.iter().map(|texel| {
+                let [r, g, b, _] = texel.map(|value| encode_srgb(value.to_f64()));
+                u32::from_le_bytes([r, g, b, u8::MAX])
+            })),
+        }
+    }
+    words
+}
+
+/// From linear, 0 to 1, to 8 bits: IEC 61966-2-1.
+fn encode_srgb(linear: f64) -> u8 {
+    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
+    (encoded * 255.0).round() as u8
 }
 
 /// The material of each body by its rank, which counts from 1.

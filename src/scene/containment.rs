@@ -53,8 +53,7 @@ impl Scene {
     /// The higher priority wins; of one priority the smaller body, so that what lies in another shows; of one volume the later
     /// object.
     pub fn ranks(&self) -> Vec<u32> {
-        let volume =
-            |object: &Object| self.meshes[object.mesh].volume() * object.transform.matrix3.determinant().abs();
+        let volume = |object: &Object| self.meshes[object.mesh].volume() * object.transform.matrix3.determinant().abs();
         let mut bodies: Vec<(i32, f64, usize)> = (0..self.objects.len())
             .filter_map(|number| {
                 let object = &self.objects[number];
