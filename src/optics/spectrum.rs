@@ -10,7 +10,7 @@ pub const WAVELENGTHS: usize = 4;
 
 /// From CIE 1931 XYZ to linear Rec. 709: ITU-R BT.709, white D65.
 const TO_REC709: DMat3 = DMat3::from_cols_array(&[
-    3.240_969_941_904_522_6,
+    3.240_969_941_904_523,
     -0.969_243_636_280_879_6,
     0.055_630_079_696_993_66,
     -1.537_383_177_570_093_9,
