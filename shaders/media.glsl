@@ -3,7 +3,10 @@
 #ifndef MEDIA_GLSL
 #define MEDIA_GLSL
 
+#include "effects.glsl"
+#include "medium.glsl"
 #include "shared.glsl"
+#include "trace.glsl"
 
 // Up to eight ranks of 16 bits, the highest first, 0 for none. A body that a ray entered twice is there twice.
 struct Bodies {
@@ -61,6 +64,50 @@ Bodies Left(Bodies bodies, uint rank)
         less.ranks[i / 2] = high << 16 | low;
     }
     return less;
+}
+
+// The material of the body of the highest rank, from 1; 0: none.
+uint MediumOf(Bodies bodies)
+{
+    uint rank = HighestRank(bodies);
+    return rank == 0 ? 0 : rankedMaterials[rank] + 1;
+}
+
+// The index of a material, from 1, at a wavelength; 1 of none. Sets `disperses` where other wavelengths have another.
+float IndexOf(uint medium, float wavelength, inout bool disperses)
+{
+    if (medium == 0) return 1.0;
+    float index = materials[medium - 1].refractionIndex;
+    float dispersion = DISPERSION ? materials[medium - 1].dispersion : 0.0;
+    if (dispersion == 0.0) return index;
+    disperses = true;
+    if (dispersion > 0.0) return DispersedIndex(index, dispersion, wavelength);
+    return SellmeierIndex(materials[medium - 1].sellmeierStrengths, materials[medium - 1].sellmeierResonances, wavelength);
+}
+
+// Where a ray is.
+struct Whereabouts {
+    uint medium;    // the material around it, from 1; 0: none
+    Bodies bodies;  // that it is in, where they can overlap
+};
+
+// The boundary of a body: where a ray that arrives is, and where one that goes on.
+struct Boundary {
+    Whereabouts before;
+    Whereabouts beyond;
+};
+
+Boundary BoundaryOf(uint instance, bool behind, Whereabouts ray)
+{
+    uint own = instances[instance].material + 1;
+    if (!NESTING) return Boundary(Whereabouts(behind ? own : 0, ray.bodies), Whereabouts(behind ? 0 : own, ray.bodies));
+    uint rank = instances[instance].rank;
+    Bodies before = ray.bodies;
+    // What is seen from the inside was entered, also where that was missed.
+    if (behind && !IsIn(before, rank)) before = Entered(before, rank);
+    Bodies beyond;
+    if (behind) beyond = Left(before, rank); else beyond = Entered(before, rank);
+    return Boundary(Whereabouts(MediumOf(before), before), Whereabouts(MediumOf(beyond), beyond));
 }
 
 #endif

@@ -326,7 +326,8 @@ fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) ->
 /// Levels of the panorama that rough surfaces see averages of; 1 where nothing is rough, or where they would not fit.
 fn levels(gpu: &Gpu, panorama: &Panorama, scene: &Scene, plan: &Plan) -> u32 {
     let fits = panorama.height + panorama.height / 2 <= gpu.max_image_side();
-    let needed = plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);
+    let opaque = plan.effects.contains(Effect::Opaque);
+    let needed = opaque || plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);
     if needed && fits { panorama.width.min(panorama.height).ilog2() + 1 } else { 1 }
 }
 

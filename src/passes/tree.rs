@@ -13,6 +13,9 @@ const SLICE: Duration = Duration::from_millis(100);
 /// Rows of a workgroup.
 const GROUP: u32 = 8;
 
+/// Pixels of a row that one invocation takes: `PIXELS` of `shaders/tree.glsl`.
+const PIXELS: u32 = 8;
+
 pub(super) struct Tree {
     pipeline: ComputePipeline,
     /// Rows of the next slice.
@@ -48,7 +51,7 @@ impl Tree {
                 cmd.use_image(&targets.mean, Use::Storage);
                 cmd.use_image(counts, Use::Storage);
                 cmd.timed("tree", |cmd| {
-                    let groups = [width.div_ceil(GROUP), rows / GROUP, 1];
+                    let groups = [width.div_ceil(GROUP * PIXELS), rows / GROUP, 1];
                     cmd.dispatch(&self.pipeline, group, &SamplePush { first_row, ..push }, groups);
                 });
             })?);
