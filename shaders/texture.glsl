@@ -7,22 +7,16 @@
 // Two numbers a vertex; (0, 0) is the bottom left of the image.
 layout(std430, set = 0, binding = 12) readonly buffer CoordinateBuffer { vec2 coordinates[]; };
 
-// Of each texture its first texel, width and height; then the texels, 8 bits a channel as sRGB.
+// Of each texture its first word, width and height; then the texels, linear, two words of two half floats each.
 layout(std430, set = 0, binding = 13) readonly buffer TexelBuffer { uint texels[]; };
-
-// From sRGB, 0 to 1, to linear: IEC 61966-2-1.
-vec3 DecodeSrgb(vec3 encoded)
-{
-    vec3 curved = pow((encoded + 0.055) / 1.055, vec3(2.4));
-    return mix(curved, encoded / 12.92, lessThanEqual(encoded, vec3(0.04045)));
-}
 
 vec3 FetchTexel(uint first, uvec2 size, ivec2 place)
 {
     // The image repeats; a place is at most one image away.
     place += ivec2(place.x < 0 ? size.x : 0, place.y < 0 ? size.y : 0);
     place -= ivec2(place.x >= int(size.x) ? size.x : 0, place.y >= int(size.y) ? size.y : 0);
-    return DecodeSrgb(unpackUnorm4x8(texels[first + uint(place.y) * size.x + uint(place.x)]).rgb);
+    uint word = first + 2 * (uint(place.y) * size.x + uint(place.x));
+    return vec3(unpackHalf2x16(texels[word]), unpackHalf2x16(texels[word + 1]).x);
 }
 
 // The colour of `texture`, counted from 1, at `uv`, bilinear.

@@ -10,7 +10,6 @@
 #ifndef TREE_GLSL
 #define TREE_GLSL
 
-#extension GL_EXT_control_flow_attributes : require
 #include "trace.glsl"
 #include "arrival.glsl"
 #include "camera.glsl"
@@ -19,12 +18,10 @@
 #include "fresnel.glsl"
 #include "media.glsl"
 #include "opaque.glsl"
-#include "texture.glsl"
+#include "pixel.glsl"
+#include "records.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
-layout(set = 0, binding = 14, rgba32f) uniform image2D mean;    // radiance, and throughput cut off
-layout(set = 0, binding = 15, rgba32f) uniform image2D counts;  // interfaces, rays
-
 // Pixels in a row of a workgroup's that one invocation takes, one after the other; as in src/passes/tree.rs.
 const int PIXELS = 8;
 
@@ -37,14 +34,6 @@ const float LEAST_CUTOFF = 1e-9;
 
 // Nanometres, where no wavelength is told from the others.
 const float D_LINE = 587.6;
-
-// Boundaries that scatter nothing, as those between equal indices, that a ray passes in a row.
-const uint MOST_PASSED = 4096;
-
-// The shares of light that reach opaque surfaces below this are none.
-const float LEAST_SHARE = 1e-6;
-
-float Largest(vec3 v) { return max(max(v.x, v.y), v.z); }
 
 struct Branch {
     vec3 origin;
@@ -72,148 +61,74 @@ struct Gathered {
     float faint;       // the share of that which was cut off for its throughput
 };
 
-// The environment towards directions that wait to be looked up, two at most a turn.
+// The environment towards a direction that waits to be looked up, and towards another: two at most a turn.
 struct Outlook {
-    vec3 throughput[2];
-    vec3 direction[2];
-    float lod;
+    vec3 throughput;
+    vec3 direction;
+    vec3 otherThroughput;
+    vec3 otherDirection;
+    uint count;
 };
+
+void LookTowards(inout Outlook outlook, vec3 throughput, vec3 direction)
+{
+    outlook.otherThroughput = outlook.throughput;
+    outlook.otherDirection = outlook.direction;
+    outlook.throughput = throughput;
+    outlook.direction = direction;
+    ++outlook.count;
+}
 
 // Counts what is cut off. In the place of what it would have found stands the environment in its direction; a constant
 // environment is a furnace, which shows what is lost only if nothing replaces it.
-void Discard(inout Gathered gathered, inout Outlook outlook, int place, vec3 throughput, vec3 direction)
+void Discard(inout Gathered gathered, inout Outlook outlook, vec3 throughput, vec3 direction)
 {
     gathered.discarded += Largest(throughput);
-    if (!ENVIRONMENT_IMAGE) return;
-    outlook.throughput[place] = throughput;
-    outlook.direction[place] = direction;
+    if (ENVIRONMENT_IMAGE) LookTowards(outlook, throughput, direction);
 }
 
-// ---- opaque surfaces: light after light, each with a ray that asks whether it is seen ---------------------------------------
+// ---- opaque surfaces -----------------------------------------------------------------------------------------------------------
 
-// A point of an opaque surface whose lights are being asked for.
-struct Lighting {
-    Arrival arrival;
-    OpaqueSurface surface;
-    mat3 toWorld;
-    vec3 wi;           // to the viewer, local frame
-    vec3 throughput;
-    Whereabouts at;
-    uint next;         // light
-    uint count;        // of lights
-};
-
-// A ray towards a light. Dielectrics on its way take what they mirror and absorb, and do not bend it.
-struct LightRay {
-    vec3 origin;
-    vec3 direction;
-    vec3 throughput;   // radiance that arrives from a point light, or the weight of the environment's
-    float reach;       // distance of a point light; infinite: the environment
-    float lod;
-    Whereabouts at;
-};
-
-// The next light that could be seen, if one is left: point lights first, then directions to the environment for what is scattered,
-// then for what is mirrored. Every pixel takes the same directions, and each sample others.
-bool NextLight(inout Lighting lighting, out LightRay ray)
+// What a mirror-like surface mirrors, of each channel; 0 where it is none.
+vec3 MirroredShare(Material material, Found found, Arrival arrival, vec3 wi, vec3 normal)
 {
-    ray.at = lighting.at;
-    ray.reach = LARGEST_FLOAT;
-    ray.lod = 0.0;
-    for (; lighting.next < lighting.count; ++lighting.next) {
-        uint number = lighting.next;
-        vec3 wo;
-        if (number < frame.lightCount) {
-            vec3 toLight = lights[number].position - lighting.arrival.position;
-            ray.reach = length(toLight);
-            if (!DIRECT_LIGHT || ray.reach == 0.0) continue;
-            wo = toLight / ray.reach * lighting.toWorld;
-            ray.throughput = EvaluateOpaque(lighting.surface, lighting.wi, wo) * lights[number].intensity / (ray.reach * ray.reach);
-        } else {
-            number -= frame.lightCount;
-            bool mirrored = number >= frame.normals;
-            uint index = sampleIndex * frame.normals + number % frame.normals;
-            vec2 u = PlasticPoint(index, uvec2(frame.seed, 0x9e3779b9u));
-            LightSample light;
-            if (mirrored) light = SampleSpecular(lighting.surface, lighting.wi, u);
-            else light = SampleDiffuse(lighting.surface, lighting.wi, u);
-            wo = light.wo;
-            ray.reach = LARGEST_FLOAT;
-            ray.throughput = light.weight / float(frame.normals);
-            float inAll = frame.normalsInAll != 0 ? float(frame.normalsInAll) : float(index + 1);
-            if (frame.environmentLevels > 1) ray.lod = EnvironmentLod(1.0 / (inAll * light.pdf), UnitFloat(index * GOLDEN_STEP));
-        }
-        ray.direction = normalize(lighting.toWorld * wo);
-        ray.throughput *= lighting.throughput;
-        bool above = dot(ray.direction, lighting.arrival.faceNormal) > 0.0 == !lighting.arrival.behind;
-        if (!above || !(Largest(ray.throughput) > 0.0)) continue;
-        ray.origin = LeaveFrom(lighting.arrival, ray.direction);
-        ++lighting.next;
-        return true;
+    OpaqueSurface surface = OpaqueSurfaceOf(BaseColor(material, found, arrival.weights), material.metallic, material.roughness, material.specular);
+    return IsSpecular(surface) && IsMirror(surface) ? FacetReflectance(surface, dot(wi, normal)) : vec3(0.0);
+}
+
+// Leaves it to lights.glsl what else an opaque surface does with the light that reaches it.
+void Leave(ivec2 place, inout uint head, inout Gathered gathered, Found found, Branch branch, uint line)
+{
+    uint number = atomicAdd(recordCount, 1);
+    if (number >= recordCapacity) {
+        gathered.discarded += Largest(branch.throughput);
+        return;
     }
-    return false;
-}
-
-vec3 BaseColor(Material material, Found found, Arrival arrival)
-{
-    if (!TEXTURES || material.texture == 0) return material.baseColor;
-    uint first = 3 * (instances[found.instance].firstTriangle + found.triangle);
-    uvec3 vertices = instances[found.instance].firstVertex + uvec3(triangles[first], triangles[first + 1], triangles[first + 2]);
-    vec2 uv = arrival.weights.x * coordinates[vertices.x] + arrival.weights.y * coordinates[vertices.y]
-        + arrival.weights.z * coordinates[vertices.z];
-    return SampleTexture(material.texture, uv);
-}
-
-Lighting LightingOf(Material material, Found found, Arrival arrival, Branch branch)
-{
-    Lighting lighting;
-    vec3 wi = -branch.direction;
-    lighting.arrival = arrival;
-    lighting.surface = OpaqueSurfaceOf(BaseColor(material, found, arrival), material.metallic, material.roughness, material.specular);
-    lighting.toWorld = BasisAround(NormalTowards(arrival.behind ? -arrival.normal : arrival.normal, wi));
-    lighting.wi = normalize(wi * lighting.toWorld);
-    lighting.throughput = branch.throughput;
-    lighting.at = branch.at;
-    lighting.next = 0;
-    bool spread = IsSpecular(lighting.surface) && !IsMirror(lighting.surface);
-    lighting.count = frame.lightCount + (spread ? 2 : 1) * frame.normals;
-    return lighting;
+    records[number] = Record(branch.origin, head, branch.direction, found.instance, branch.throughput, found.triangle, branch.at.bodies.ranks,
+        branch.at.medium, line, uvec2(0));
+    head = number + 1;
 }
 
 // ---- pixels --------------------------------------------------------------------------------------------------------------------
-
-// Moves the means of a pixel by one sample: means, not sums, as in accumulate.comp.
-void Store(ivec2 place, vec4 value, vec4 count)
-{
-    if (sampleIndex != 0) {
-        vec4 before = imageLoad(mean, place);
-        value = before + (value - before) / float(sampleIndex + 1);
-        before = imageLoad(counts, place);
-        count = before + (count - before) / float(sampleIndex + 1);
-    }
-    imageStore(mean, place, value);
-    imageStore(counts, place, count);
-}
 
 // What the next ray is.
 const uint NEXT_PIXEL = 0;   // the camera's of the next pixel
 const uint NEXT_TREE = 1;    // the camera's of this one once more
 const uint NEXT_BRANCH = 2;  // the branch
-const uint NEXT_LIGHT = 3;   // the light ray
 
 void main()
 {
     uint next = NEXT_PIXEL;
     int column = -1;
-    ivec2 place;
-    uint interfaces;
-    uint rays;
+    ivec2 place = ivec2(0);
+    uint interfaces = 0;
+    uint rays = 0;
 
     // Trees of the pixel: one for each wavelength, if any index tells them from each other.
-    uint line;
-    bool disperses;
-    vec3 radiance;
-    vec3 discarded;
+    uint line = 0;
+    bool disperses = false;
+    vec3 radiance = vec3(0.0);
+    vec3 discarded = vec3(0.0);
     float tolerance = frame.tolerance;
     if (DISPERSION) {
         vec3 shares = vec3(0.0);
@@ -222,14 +137,15 @@ void main()
     }
 
     // The tree.
-    Gathered gathered;
-    float cutoff;
-    Branch branch;
+    Gathered gathered = Gathered(vec3(0.0), 0.0, 0.0);
+    float cutoff = 0.0;
+    Branch branch = CameraBranch(vec2(0.0));
     Branch waiting[TREE_STACK];
-    int top;
-    uint passed;
-    Lighting lighting;
-    LightRay light;
+    int top = 0;
+    uint passed = 0;
+    Arrival nowhere = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), false, 0.0, vec3(0.0));
+    uint head = 0;      // of the records that wait for their lights
+    uint headBefore = 0;
 
     for (;;) {
         if (next == NEXT_PIXEL) {
@@ -240,6 +156,7 @@ void main()
             disperses = false;
             radiance = discarded = vec3(0.0);
             cutoff = frame.cutoff;
+            head = headBefore = 0;
             next = NEXT_TREE;
         }
         if (next == NEXT_TREE) {
@@ -247,42 +164,27 @@ void main()
             branch = CameraBranch(vec2(place) + 0.5 + jitter);
             top = 0;
             passed = 0;
+            head = headBefore;
             next = NEXT_BRANCH;
         }
-        bool toLight = OPAQUE && next == NEXT_LIGHT;
-        vec3 origin = toLight ? light.origin : branch.origin;
-        vec3 direction = toLight ? light.direction : branch.direction;
         Found found;
-        bool any = Trace(origin, direction, found);
+        vec3 direction = branch.direction;
+        bool any = Trace(branch.origin, direction, found);
         ++rays;
 
-        Outlook outlook;
-        outlook.throughput[0] = outlook.throughput[1] = vec3(0.0);
-        outlook.direction[0] = outlook.direction[1] = direction;
-        outlook.lod = toLight ? light.lod : 0.0;
+        Outlook outlook = Outlook(vec3(0.0), direction, vec3(0.0), direction, 0);
         bool goesOn = false;
-        Arrival arrival;
-        if (any) arrival = ArriveAt(found, origin, direction);
-        if (toLight && any && arrival.distance >= light.reach) any = false;
         if (!any) {
-            if (toLight && light.reach < LARGEST_FLOAT) {
-                gathered.radiance += light.throughput;
-            } else if (toLight) {
-                outlook.throughput[0] = light.throughput;
-            } else if (frame.environmentVisible != 0 || branch.depth > 0) {
-                outlook.throughput[0] = branch.throughput;
-            }
+            if (frame.environmentVisible != 0 || branch.depth > 0) LookTowards(outlook, branch.throughput, direction);
         } else {
+            Arrival arrival = ArriveAt(found, branch.origin, direction);
             Material material = materials[instances[found.instance].material];
             bool isPane = THIN_WALLED && material.kind == KIND_PANE;
             bool isOpaque = OPAQUE && material.kind == KIND_OPAQUE;
-            Whereabouts at = branch.at;
-            if (toLight) at = light.at;
-            Boundary boundary = Boundary(at, at);
-            if (!isOpaque && !isPane) boundary = BoundaryOf(found.instance, arrival.behind, at);
-            vec3 arriving = vec3(1.0);
+            Boundary boundary = Boundary(branch.at, branch.at);
+            if (!isOpaque && !isPane) boundary = BoundaryOf(found.instance, arrival.behind, branch.at);
             if (ABSORPTION && boundary.before.medium != 0) {
-                arriving = Transmittance(materials[boundary.before.medium - 1].absorption, arrival.distance);
+                branch.throughput *= Transmittance(materials[boundary.before.medium - 1].absorption, arrival.distance);
             }
             float wavelength = DISPERSION ? spectrum[line].w : D_LINE;
             float etaI = IndexOf(boundary.before.medium, wavelength, disperses);
@@ -292,9 +194,9 @@ void main()
             vec3 wi = -direction;
             vec3 faceNormal = arrival.behind ? -arrival.faceNormal : arrival.faceNormal;
             vec3 normal = NormalTowards(arrival.behind ? -arrival.normal : arrival.normal, wi);
-            Refraction refraction;
-            float reflectance;
-            float transmittance;
+            Refraction refraction = Refraction(vec3(0.0), Interface(0.0, 1.0, 1.0, false));
+            float reflectance = 0.0;
+            float transmittance = 1.0;
             if (!isOpaque && !passes) {
                 refraction = Refract(wi, normal, etaI, etaT);
                 reflectance = refraction.crossed.reflectance;
@@ -306,39 +208,27 @@ void main()
                 }
             }
 
-            if (toLight) {
-                light.throughput *= arriving;
-                if (!passes) light.throughput *= isOpaque ? 0.0 : transmittance;
-                light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
-                light.at = boundary.beyond;
-                light.origin = LeaveFrom(arrival, direction);
-                goesOn = Largest(light.throughput) > LEAST_SHARE * Largest(lighting.throughput) && ++passed <= MOST_PASSED;
-            } else if (isOpaque) {
-                branch.throughput *= arriving;
+            if (isOpaque) {
                 ++interfaces;
                 // Light is given as it is in the medium that the surface lies in.
                 float index = IndexOf(branch.at.medium, wavelength, disperses);
                 gathered.radiance += branch.throughput * material.emission / (index * index);
-                lighting = LightingOf(material, found, arrival, branch);
-                if (IsSpecular(lighting.surface) && IsMirror(lighting.surface)) {
-                    vec3 share = FacetReflectance(lighting.surface, lighting.wi.z);
+                Leave(place, head, gathered, found, branch, line);
+                branch.throughput *= MirroredShare(material, found, arrival, wi, normal);
+                if (Largest(branch.throughput) > 0.0) {
                     vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
-                    branch.throughput *= share;
-                    if (branch.depth < frame.maxDepth && Largest(branch.throughput) > cutoff && top < TREE_STACK) {
-                        waiting[top++] = Child(branch, arrival, wr, 1.0, branch.at);
-                    } else {
-                        Discard(gathered, outlook, 0, branch.throughput, wr);
-                    }
+                    goesOn = branch.depth < frame.maxDepth && Largest(branch.throughput) > cutoff;
+                    if (goesOn) branch = Child(branch, arrival, wr, 1.0, branch.at);
+                    else Discard(gathered, outlook, branch.throughput, wr);
                 }
             } else {
-                branch.throughput *= arriving;
                 if (passes) {
                     branch.at = boundary.beyond;
                     branch.origin = LeaveFrom(arrival, direction);
                     goesOn = ++passed <= MOST_PASSED;
                 }
                 if (passes ? !goesOn : branch.depth >= frame.maxDepth) {
-                    Discard(gathered, outlook, 0, branch.throughput, direction);
+                    Discard(gathered, outlook, branch.throughput, direction);
                 } else if (!passes) {
                     ++interfaces;
                     passed = 0;
@@ -350,10 +240,8 @@ void main()
                     float whole = Largest(branch.throughput);
                     if (!INTERIOR) {
                         // The environment is all that lies beyond.
-                        outlook.throughput[0] = branch.throughput * reflectance;
-                        outlook.direction[0] = wr;
-                        outlook.throughput[1] = branch.throughput * transmittance;
-                        outlook.direction[1] = wt;
+                        LookTowards(outlook, branch.throughput * reflectance, wr);
+                        LookTowards(outlook, branch.throughput * transmittance, wt);
                     } else {
                         bool reflects = whole * reflectance > cutoff;
                         bool transmits = whole * transmittance > cutoff;
@@ -363,11 +251,11 @@ void main()
                         }
                         if (!reflects && reflectance > 0.0) {
                             gathered.faint += whole * reflectance;
-                            Discard(gathered, outlook, 0, branch.throughput * reflectance, wr);
+                            Discard(gathered, outlook, branch.throughput * reflectance, wr);
                         }
                         if (!transmits && transmittance > 0.0) {
                             gathered.faint += whole * transmittance;
-                            Discard(gathered, outlook, 1, branch.throughput * transmittance, wt);
+                            Discard(gathered, outlook, branch.throughput * transmittance, wt);
                         }
                         bool goesReflected = reflects && (reflectedFirst || !transmits);
                         if (reflects && transmits) {
@@ -381,23 +269,16 @@ void main()
                     }
                 }
             }
-            if (isOpaque && !toLight) goesOn = NextLight(lighting, light);
-            if (isOpaque && !toLight && goesOn) {
-                next = NEXT_LIGHT;
-                passed = 0;
-            }
         }
 
-        [[dont_unroll]] for (int i = 0; i < 2; ++i) {
-            if (Largest(outlook.throughput[i]) > 0.0) {
-                gathered.radiance += outlook.throughput[i] * SampleEnvironment(outlook.direction[i], outlook.lod);
-            }
+        for (uint i = 0; i < outlook.count; ++i) {
+            gathered.radiance += outlook.throughput * SampleEnvironment(outlook.direction, 0.0);
+            outlook.throughput = outlook.otherThroughput;
+            outlook.direction = outlook.otherDirection;
         }
 
         if (goesOn) continue;
         passed = 0;
-        if (toLight && NextLight(lighting, light)) continue;
-        next = NEXT_BRANCH;
         if (gathered.faint > tolerance && cutoff > LEAST_CUTOFF) {
             cutoff /= CUTOFF_STEP;
             next = NEXT_TREE;
@@ -409,9 +290,11 @@ void main()
             discarded += weight * gathered.discarded;
             next = NEXT_TREE;
             cutoff = frame.cutoff;
+            headBefore = head;
             if (!DISPERSION || !disperses || ++line == wavelengths) {
                 float scale = frame.cameraIndex * frame.cameraIndex;
-                Store(place, scale * vec4(radiance, Largest(discarded)), vec4(float(interfaces), float(rays), 0.0, 0.0));
+                Sample one = Sample(scale * vec4(radiance, Largest(discarded)), interfaces, rays, head, uint(disperses));
+                if (OPAQUE) samples[SampleAt(place)] = one; else AddSample(place, one);
                 next = NEXT_PIXEL;
             }
         }

@@ -32,7 +32,7 @@ use environment::EnvironmentPass;
 use geometry::Draw;
 use resources::Resources;
 use single::Single;
-use tree::Tree;
+use tree::{Pending, Tree};
 
 pub use aov::Aovs;
 pub use sampling::pixel_offsets;
@@ -122,8 +122,8 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
     times.add(time);
     let mean = commands.read_image(&targets.mean)?;
     let radiance = radiance(&mean)?;
-    let tree = match &targets.counts {
-        Some(counts) => Some(TreeCounts::new(&mean, &commands.read_image(counts)?, samples)),
+    let tree = match &targets.tree {
+        Some(tree) => Some(TreeCounts::new(&mean, &commands.read_image(&tree.counts)?, samples)),
         None => None,
     };
     let mut aovs = None;
@@ -178,7 +178,7 @@ impl Passes {
         let small = Size { width: 16, height: 16 };
         let targets = Targets::new(&gpu, small, resources, plan.model)?;
         let model = match (&targets.tree, trace) {
-            (Some(group), Some(trace)) => ModelPass::Tree(Tree::new(&gpu, resources, group, trace)?),
+            (Some(tree), Some(trace)) => ModelPass::Tree(Tree::new(commands, resources, &tree.group, trace)?),
             _ => ModelPass::Raster {
                 single: Single::new(&gpu, resources)?,
                 environment: EnvironmentPass::new(&gpu, resources)?,
@@ -228,12 +228,32 @@ impl Passes {
 struct Targets {
     accumulation: BindGroup,
     display: BindGroup,
-    /// The scene with the images that `tree` writes.
-    tree: Option<BindGroup>,
+    /// What `tree` reads and writes.
+    tree: Option<TreeTargets>,
     radiance: Arc<Image>,
     mean: Arc<Image>,
-    counts: Option<Arc<Image>>,
     depth: Image,
+}
+
+/// What the model `tree` reads and writes beside the mean.
+struct TreeTargets {
+    /// All of it, and the scene.
+    group: BindGroup,
+    counts: Arc<Image>,
+    pending: Pending,
+}
+
+impl TreeTargets {
+    fn new(gpu: &Gpu, resources: &Resources, mean: &Arc<Image>) -> Result<Self> {
+        let (width, height) = (mean.width(), mean.height());
+        let uses = &[Use::Storage, Use::CopySource];
+        let counts = Arc::new(Image::new(gpu, &ImageDesc { name: "counts", width, height, format: RADIANCE, uses })?);
+        let pending = Pending::new(gpu, resources.opaque)?;
+        let mut bindings = resources.traced.clone();
+        bindings.extend([Bind::Storage(mean.clone()), Bind::Storage(counts.clone())]);
+        bindings.extend(pending.bindings());
+        Ok(Self { group: BindGroup::new(gpu, "tree", bindings)?, counts, pending })
+    }
 }
 
 impl Targets {
@@ -243,21 +263,16 @@ impl Targets {
         let mean = Arc::new(image("mean", RADIANCE, &[Use::Storage, Use::Sampled, Use::CopySource])?);
         let depth = image("depth", Format::Depth32, &[Use::DepthTarget])?;
         let accumulation = vec![Bind::Sampled(radiance.clone()), Bind::Storage(mean.clone())];
-        let (mut counts, mut tree) = (None, None);
-        if model == Model::Tree {
-            let image = Arc::new(image("counts", RADIANCE, &[Use::Storage, Use::CopySource])?);
-            let mut bindings = resources.traced.clone();
-            bindings.extend([Bind::Storage(mean.clone()), Bind::Storage(image.clone())]);
-            tree = Some(BindGroup::new(gpu, "tree", bindings)?);
-            counts = Some(image);
-        }
+        let tree = match model {
+            Model::Tree => Some(TreeTargets::new(gpu, resources, &mean)?),
+            Model::Single | Model::Double | Model::Path => None,
+        };
         Ok(Self {
             accumulation: BindGroup::new(gpu, "accumulation", accumulation)?,
             display: BindGroup::new(gpu, "display", vec![Bind::Sampled(mean.clone())])?,
             tree,
             radiance,
             mean,
-            counts,
             depth,
         })
     }

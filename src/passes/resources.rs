@@ -35,6 +35,8 @@ pub(super) struct Resources {
     pub(super) specialization: Specialization,
     /// From lengths on the device to metres.
     pub(super) metres_per_unit: f64,
+    /// Whether surfaces are lit that let nothing through.
+    pub(super) opaque: bool,
     /// Host time that hierarchies took, if there are any.
     pub(super) acceleration: Option<Duration>,
 }
@@ -110,6 +112,7 @@ impl Resources {
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects).with(ENVIRONMENT_IMAGE, specialization),
             metres_per_unit: 1.0 / view.units_per_metre,
+            opaque: trace.is_some() && plan.effects.contains(Effect::Opaque),
             acceleration: trace.map(|_| acceleration),
         })
     }
@@ -184,27 +187,30 @@ fn opaque_record(opaque: &Opaque) -> MaterialRecord {
     }
 }
 
-/// All textures in one buffer: where each starts, its width and its height, then the texels, 8 bits a channel as sRGB.
+/// All textures in one buffer: where each starts, its width and its height, then the texels as half floats, linear.
 fn texels(textures: &[Texture]) -> Vec<u32> {
     let mut words = vec![0; 3 * textures.len()];
     for (number, texture) in textures.iter().enumerate() {
         let header = [words.len() as u32, texture.width, texture.height];
         words[3 * number..][..3].copy_from_slice(&header);
         match &texture.texels {
-            Texels::Srgb(texels) => words.extend(texels.iter().map(|&texel| u32::from_le_bytes(texel))),
-            Texels::Linear(texels) => words.extend(texels.iter().map(|texel| {
-                let [r, g, b, _] = texel.map(|value| encode_srgb(value.to_f64()));
-                u32::from_le_bytes([r, g, b, u8::MAX])
-            })),
+            Texels::Srgb(texels) => words.extend(texels.iter().flat_map(|&texel| pack_texel(texel.map(decode_srgb)))),
+            Texels::Linear(texels) => words.extend(texels.iter().flat_map(|&texel| pack_texel(texel))),
         }
     }
     words
 }
 
-/// From linear, 0 to 1, to 8 bits: IEC 61966-2-1.
-fn encode_srgb(linear: f64) -> u8 {
-    let encoded = if linear <= 0.003_130_8 { 12.92 * linear } else { 1.055 * linear.powf(1.0 / 2.4) - 0.055 };
-    (encoded * 255.0).round() as u8
+fn pack_texel([r, g, b, a]: [f16; 4]) -> [u32; 2] {
+    let pair = |low: f16, high: f16| u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16;
+    [pair(r, g), pair(b, a)]
+}
+
+/// From 8 bits as sRGB to linear: IEC 61966-2-1.
+fn decode_srgb(encoded: u8) -> f16 {
+    let encoded = f64::from(encoded) / 255.0;
+    let linear = if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
+    f16::from_f64(linear)
 }
 
 /// The material of each body by its rank, which counts from 1.

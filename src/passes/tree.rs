@@ -1,10 +1,15 @@
-//! The model `tree`: every pixel's reflections and refractions, enumerated by a compute shader.
+//! The model `tree`: every pixel's reflections and refractions, enumerated by one compute shader; a second one lights the opaque
+//! surfaces that the first has found.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::Targets;
 use super::resources::Resources;
-use crate::gpu::{BindGroup, Commands, ComputePipeline, Gpu, PassTime, Result, SamplePush, Use, shaders};
+use crate::gpu::{
+    Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Gpu, PassTime, Result, SamplePush, Use,
+    shaders,
+};
 use crate::options::Trace;
 
 /// How long one submission should take: a GPU's watchdog stays calm, and so does whoever waits at the screen.
@@ -16,21 +21,85 @@ const GROUP: u32 = 8;
 /// Pixels of a row that one invocation takes: `PIXELS` of `shaders/tree.glsl`.
 const PIXELS: u32 = 8;
 
+/// Pixels of a slice, where their samples wait for light.
+const MOST_SAMPLES: u32 = 1 << 19;
+
+/// Points of opaque surfaces that wait for light in a slice.
+const MOST_RECORDS: u32 = 1 << 19;
+
+/// Bytes of `Sample`, `Record` and what stands before the records, in `shaders/pixel.glsl` and `shaders/records.glsl`.
+const SAMPLE_BYTES: u64 = 32;
+const RECORD_BYTES: u64 = 80;
+const HEADER_BYTES: u64 = 16;
+
 pub(super) struct Tree {
     pipeline: ComputePipeline,
+    lights: Option<Lights>,
     /// Rows of the next slice.
     rows: u32,
 }
 
-impl Tree {
-    pub(super) fn new(gpu: &Gpu, resources: &Resources, group: &BindGroup, trace: Trace) -> Result<Self> {
-        let shader = match trace {
-            Trace::Hardware => &shaders::TREE_HARDWARE_COMP,
-            Trace::Software => &shaders::TREE_COMP,
+/// What lights opaque surfaces.
+struct Lights {
+    pipeline: ComputePipeline,
+    /// The records' headers before a slice that may be repeated, and before one that may not.
+    repeatable: Buffer,
+    last: Buffer,
+    /// The header after it.
+    header: Buffer,
+}
+
+/// Samples and points of opaque surfaces that wait for their lights.
+pub(super) struct Pending {
+    samples: Arc<Buffer>,
+    pub(super) records: Arc<Buffer>,
+}
+
+impl Pending {
+    /// Room for both, next to none if no surface is opaque.
+    pub(super) fn new(gpu: &Gpu, opaque: bool) -> Result<Self> {
+        let buffer = |name, most: u32, bytes: u64| {
+            let size = HEADER_BYTES + if opaque { u64::from(most) } else { 1 } * bytes;
+            Buffer::new(gpu, &BufferDesc { name, size, usage: BufferUse::Storage }).map(Arc::new)
         };
+        Ok(Self {
+            samples: buffer("samples that wait for light", MOST_SAMPLES, SAMPLE_BYTES)?,
+            records: buffer("points that wait for light", MOST_RECORDS, RECORD_BYTES)?,
+        })
+    }
+
+    pub(super) fn bindings(&self) -> [Bind; 2] {
+        [Bind::Buffer(self.samples.clone()), Bind::Buffer(self.records.clone())]
+    }
+}
+
+impl Tree {
+    pub(super) fn new(
+        commands: &mut Commands,
+        resources: &Resources,
+        group: &BindGroup,
+        trace: Trace,
+    ) -> Result<Self> {
+        let (tree, lights) = match trace {
+            Trace::Hardware => (&shaders::TREE_HARDWARE_COMP, &shaders::LIGHTS_HARDWARE_COMP),
+            Trace::Software => (&shaders::TREE_COMP, &shaders::LIGHTS_COMP),
+        };
+        let gpu = commands.gpu().clone();
         let bytes = size_of::<SamplePush>() as u32;
-        let pipeline = ComputePipeline::new(gpu, shader, group, bytes, &resources.specialization)?;
-        Ok(Self { pipeline, rows: 2 * GROUP })
+        let pipeline = |shader| ComputePipeline::new(&gpu, shader, group, bytes, &resources.specialization);
+        let lights = match resources.opaque {
+            false => None,
+            true => Some(Lights {
+                pipeline: pipeline(lights)?,
+                repeatable: commands.upload_buffer("header of a slice", &[0, MOST_RECORDS, 1, 0])?,
+                last: commands.upload_buffer("header of a last slice", &[0, MOST_RECORDS, 0, 0])?,
+                header: Buffer::new(
+                    &gpu,
+                    &BufferDesc { name: "header read back", size: HEADER_BYTES, usage: BufferUse::Readback },
+                )?,
+            }),
+        };
+        Ok(Self { pipeline: pipeline(tree)?, lights, rows: 2 * GROUP })
     }
 
     /// One sample of every pixel, in slices of rows; each is as high as the last one's time suggests.
@@ -40,21 +109,37 @@ impl Tree {
         targets: &Targets,
         push: SamplePush,
     ) -> Result<Vec<PassTime>> {
-        let (Some(group), Some(counts)) = (&targets.tree, &targets.counts) else { return Ok(Vec::new()) };
+        let Some(tree) = &targets.tree else { return Ok(Vec::new()) };
         let (width, height) = (targets.mean.width(), targets.mean.height());
+        let most_rows = (MOST_SAMPLES / width / GROUP).max(1) * GROUP;
         let mut times = Vec::new();
         let mut first_row = 0;
         while first_row < height {
-            let rows = self.rows.min((height - first_row).next_multiple_of(GROUP));
+            let rows = self.rows.min(most_rows).min((height - first_row).next_multiple_of(GROUP));
+            let push = SamplePush { first_row, ..push };
             let start = Instant::now();
             times.extend(commands.run(|cmd| {
                 cmd.use_image(&targets.mean, Use::Storage);
-                cmd.use_image(counts, Use::Storage);
+                cmd.use_image(&tree.counts, Use::Storage);
+                if let Some(lights) = &self.lights {
+                    let header = if rows > GROUP { &lights.repeatable } else { &lights.last };
+                    cmd.copy_buffer(header, &tree.pending.records);
+                }
                 cmd.timed("tree", |cmd| {
-                    let groups = [width.div_ceil(GROUP * PIXELS), rows / GROUP, 1];
-                    cmd.dispatch(&self.pipeline, group, &SamplePush { first_row, ..push }, groups);
+                    cmd.dispatch(&self.pipeline, &tree.group, &push, [width.div_ceil(GROUP * PIXELS), rows / GROUP, 1]);
                 });
+                if let Some(lights) = &self.lights {
+                    cmd.wait_for_buffers();
+                    cmd.timed("lights", |cmd| {
+                        cmd.dispatch(&lights.pipeline, &tree.group, &push, [width.div_ceil(GROUP), rows / GROUP, 1]);
+                    });
+                    cmd.copy_buffer(&tree.pending.records, &lights.header);
+                }
             })?);
+            if rows > GROUP && self.lights.as_ref().is_some_and(Lights::lost_records) {
+                self.rows = (rows / 2).next_multiple_of(GROUP);
+                continue;
+            }
             first_row += rows;
             let spent = start.elapsed();
             if spent < SLICE / 2 {
@@ -64,6 +149,14 @@ impl Tree {
             }
         }
         Ok(times)
+    }
+}
+
+impl Lights {
+    /// Whether the last slice found more points than there is room for.
+    fn lost_records(&self) -> bool {
+        let found: Option<&[u8; 4]> = self.header.bytes().first_chunk();
+        found.is_some_and(|&count| u32::from_ne_bytes(count) > MOST_RECORDS)
     }
 }
 

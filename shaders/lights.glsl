@@ -1,0 +1,164 @@
+// The light of opaque surfaces: point lights, and directions to the environment, each with a ray that asks whether it is seen. A
+// pixel's records are taken up one after the other; one loop, a ray a turn, as in tree.glsl.
+#ifndef LIGHTS_GLSL
+#define LIGHTS_GLSL
+
+#include "trace.glsl"
+#include "arrival.glsl"
+#include "effects.glsl"
+#include "environment.glsl"
+#include "fresnel.glsl"
+#include "media.glsl"
+#include "opaque.glsl"
+#include "pixel.glsl"
+#include "records.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// Nanometres, where no wavelength is told from the others.
+const float D_LINE = 587.6;
+
+// Shares of light below this are none.
+const float LEAST_SHARE = 1e-6;
+
+// A point of an opaque surface in its local frame.
+struct Lit {
+    Arrival arrival;
+    OpaqueSurface surface;
+    mat3 toWorld;
+    vec3 wi;       // to the viewer
+};
+
+Lit LitAt(Record record)
+{
+    Lit lit;
+    Found found = Found(record.instance, record.triangle);
+    Material material = materials[instances[found.instance].material];
+    lit.arrival = ArriveAt(found, record.origin, record.direction);
+    vec3 normal = lit.arrival.behind ? -lit.arrival.normal : lit.arrival.normal;
+    lit.toWorld = BasisAround(NormalTowards(normal, -record.direction));
+    lit.wi = normalize(-record.direction * lit.toWorld);
+    vec3 color = BaseColor(material, found, lit.arrival.weights);
+    lit.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
+    return lit;
+}
+
+// A ray towards a light. Dielectrics on its way take what they mirror and absorb, and do not bend it.
+struct LightRay {
+    vec3 origin;
+    vec3 direction;
+    vec3 throughput;   // radiance that arrives from a point light, or the weight of the environment's
+    float reach;       // distance of a point light; infinite: the environment
+    float lod;
+    Whereabouts at;
+};
+
+// Lights of a point: point lights, then directions to the environment for what is scattered, then for what is mirrored.
+uint LightsOf(Lit lit)
+{
+    bool spread = IsSpecular(lit.surface) && !IsMirror(lit.surface);
+    return frame.lightCount + (spread ? 2 : 1) * frame.normals;
+}
+
+// The ray to light `number` of the point of `record`; false if its light cannot be seen. Every pixel takes the same directions, each
+// sample others.
+bool AskFor(uint number, Record record, Lit lit, out LightRay ray)
+{
+    vec3 wo;
+    if (number < frame.lightCount) {
+        vec3 toLight = lights[number].position - lit.arrival.position;
+        ray.reach = max(length(toLight), 1e-30);
+        wo = toLight / ray.reach * lit.toWorld;
+        ray.throughput = EvaluateOpaque(lit.surface, lit.wi, wo) * lights[number].intensity / (ray.reach * ray.reach);
+        if (!DIRECT_LIGHT) ray.throughput = vec3(0.0);
+        ray.lod = 0.0;
+    } else {
+        number -= frame.lightCount;
+        uint index = sampleIndex * frame.normals + number % frame.normals;
+        vec2 u = PlasticPoint(index, uvec2(frame.seed, GOLDEN_STEP));
+        LightSample light;
+        if (number < frame.normals) light = SampleDiffuse(lit.surface, lit.wi, u); else light = SampleSpecular(lit.surface, lit.wi, u);
+        wo = light.wo;
+        ray.reach = LARGEST_FLOAT;
+        ray.throughput = light.weight / float(frame.normals);
+        float inAll = frame.normalsInAll != 0 ? float(frame.normalsInAll) : float(index + 1);
+        ray.lod = frame.environmentLevels > 1 ? EnvironmentLod(1.0 / (inAll * light.pdf), UnitFloat(index * GOLDEN_STEP)) : 0.0;
+    }
+    ray.throughput *= record.throughput;
+    ray.direction = normalize(lit.toWorld * wo);
+    ray.origin = LeaveFrom(lit.arrival, ray.direction);
+    ray.at = Whereabouts(record.medium, Bodies(record.bodies));
+    bool above = (dot(ray.direction, lit.arrival.faceNormal) > 0.0) != lit.arrival.behind;
+    return above && Largest(ray.throughput) > 0.0;
+}
+
+// What a dielectric at `arrival` leaves of a light ray that goes straight through it.
+void PassThrough(inout LightRay light, uint instance, Material material, Arrival arrival)
+{
+    bool isPane = THIN_WALLED && material.kind == KIND_PANE;
+    Boundary boundary = Boundary(light.at, light.at);
+    if (!isPane) boundary = BoundaryOf(instance, arrival.behind, light.at);
+    if (ABSORPTION && boundary.before.medium != 0) {
+        light.throughput *= Transmittance(materials[boundary.before.medium - 1].absorption, arrival.distance);
+    }
+    bool disperses = false;
+    float etaI = IndexOf(boundary.before.medium, D_LINE, disperses);
+    float etaT = isPane ? material.refractionIndex : IndexOf(boundary.beyond.medium, D_LINE, disperses);
+    vec3 normal = arrival.behind ? -arrival.normal : arrival.normal;
+    Interface crossed = FresnelDielectric(max(dot(-light.direction, normal), LEAST_SLOPE), etaI, etaT);
+    light.throughput *= isPane && !crossed.total ? crossed.transmittance / (1.0 + crossed.reflectance) : crossed.transmittance;
+    light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
+    light.at = boundary.beyond;
+    light.origin = LeaveFrom(arrival, light.direction);
+}
+
+void main()
+{
+    ivec2 place = ivec2(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y + firstRow);
+    if (any(greaterThanEqual(place, imageSize(mean)))) return;
+    if (recordsRepeat != 0 && recordCount > recordCapacity) return;
+    Sample one = samples[SampleAt(place)];
+    float scale = frame.cameraIndex * frame.cameraIndex;
+    LightRay light = LightRay(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, Whereabouts(0, Bodies(uvec4(0))));
+    uint head = one.head;
+    uint number = 0;
+    uint passed = 0;
+    bool onItsWay = false;
+    while (head != 0) {
+        if (!onItsWay) {
+            Record record = records[head - 1];
+            if (DISPERSION && one.disperses != 0) record.throughput *= spectrum[record.line].rgb;
+            Lit lit = LitAt(record);
+            passed = 0;
+            if (number < LightsOf(lit)) {
+                onItsWay = AskFor(number, record, lit, light);
+                ++number;
+            } else {
+                head = record.next;
+                number = 0;
+            }
+        }
+        if (onItsWay) {
+            Found found;
+            Arrival arrival;
+            bool any = false;
+            if (light.reach == LARGEST_FLOAT || SHADOWS) {
+                any = Trace(light.origin, light.direction, found);
+                ++one.rays;
+            }
+            if (any) arrival = ArriveAt(found, light.origin, light.direction);
+            onItsWay = any && arrival.distance < light.reach;
+            if (onItsWay) {
+                Material material = materials[instances[found.instance].material];
+                PassThrough(light, found.instance, material, arrival);
+                onItsWay = material.kind != KIND_OPAQUE && Largest(light.throughput) > LEAST_SHARE && ++passed <= MOST_PASSED;
+            } else {
+                vec3 radiance = light.reach == LARGEST_FLOAT ? SampleEnvironment(light.direction, light.lod) : vec3(1.0);
+                one.value.rgb += scale * light.throughput * radiance;
+            }
+        }
+    }
+    AddSample(place, one);
+}
+
+#endif
