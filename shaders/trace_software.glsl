@@ -132,7 +132,7 @@ bool Trace(vec3 origin, vec3 direction, out Found found)
             uint triangle = firstTriangle + number;
             Meeting meeting;
             if (MeetTriangle(sheared, FetchCorner(triangle, 0), FetchCorner(triangle, 1), FetchCorner(triangle, 2), meeting)
-                && meeting.t > 0.0 && meeting.t < nearest) {
+                && meeting.t < nearest) {
                 nearest = meeting.t;
                 found = Found(instance, number);
                 any = true;
