@@ -1,8 +1,9 @@
 // Where a ray meets a triangle, watertight: Woop, Benthin & Wald, "Watertight Ray/Triangle Intersection", JCGT 2013.
 //
-// Seen along the ray a triangle's corners are points of a plane, the same for every triangle that shares them. Which side of an
-// edge the ray passes is the sign of a difference of two products. Rounding does not change the order of products: the
-// sign is right or 0, and with 0 as inside for the triangles on both sides no ray slips through an edge or a corner.
+// Seen along the ray a triangle's corners are points of a plane, the same for every triangle that shares them. Which
+// side of an edge the ray passes is the sign of a difference of two products. Rounding does not change the order of
+// products: the sign is right or 0, and with 0 as inside for the triangles on both sides no ray slips through an edge
+// or a corner.
 #ifndef TRIANGLE_GLSL
 #define TRIANGLE_GLSL
 
@@ -38,9 +39,9 @@ struct Meeting {
 // What rounding may do to a distance along a ray: this share of how far the corners are.
 const float DOUBT = 1e-6;
 
-// Whether the plane through `a`, `b` and `c` lies ahead of the origin and not behind it. It tells where the distance along the ray
-// is in doubt: a ray that has just left the plane starts beside it by no more than what rounding can move a point across it,
-// which may be far less than what it can move one along the ray.
+// Whether the plane through `a`, `b` and `c` lies ahead of the origin and not behind it. It tells where the distance
+// along the ray is in doubt: a ray that has just left the plane starts beside it by no more than what rounding can
+// move a point across it, which may be far less than what it can move one along the ray.
 bool IsPlaneAhead(vec3 direction, vec3 a, vec3 b, vec3 c)
 {
     vec3 normal = cross(b - a, c - a);
