@@ -1,8 +1,8 @@
-// Trace() without help of the device: two levels of compressed wide nodes, src/passes/bvh.rs. Ylitie, Karras & Laine, "Efficient
-// Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017.
+// Trace() without help of the device: two levels of compressed wide nodes, src/passes/bvh.rs. Ylitie, Karras & Laine,
+// "Efficient Incoherent Ray Traversal on GPUs Through Compressed Wide BVHs", HPG 2017.
 //
-// A node has up to eight children; their boxes are bytes on a grid of its own. The upper level's leaves are instances: there the
-// ray is turned into the instance's space and goes on at the root of its mesh.
+// A node has up to eight children; their boxes are bytes on a grid of its own. The upper level's leaves are
+// instances: there the ray is turned into the instance's space and goes on at the root of its mesh.
 #ifndef TRACE_SOFTWARE_GLSL
 #define TRACE_SOFTWARE_GLSL
 
@@ -10,7 +10,8 @@
 
 layout(std430, set = 0, binding = 9) readonly buffer NodeBuffer { uvec4 nodes[]; };  // five a node
 
-// Groups that wait. One a level at most, and one more for each level of the upper hierarchy; the host refuses deeper ones.
+// Groups that wait. One a level at most, and one more for each level of the upper hierarchy; the host refuses deeper
+// ones.
 const int TRACE_STACK = 48;
 
 // A ray as the boxes of nodes meet it.
@@ -28,8 +29,8 @@ BoxRay BoxRayOf(vec3 origin, vec3 direction)
     return BoxRay(origin, 1.0 / safe, octant);
 }
 
-// Which children's boxes the ray meets before `limit`: a bit each, inner nodes in the upper byte in the order of the way, the
-// triangles of leaves below.
+// Which children's boxes the ray meets before `limit`: a bit each, inner nodes in the upper byte in the order of the
+// way, the triangles of leaves below.
 uint MeetChildren(uint node, BoxRay ray, float limit, out uvec2 groups, out uint inner)
 {
     uvec4 head = nodes[5 * node];
@@ -79,8 +80,8 @@ uint TakeNode(inout uvec2 group, uint octant)
     return group.x + uint(bitCount(group.y & ~(0xffffffffu << slot) & 0xffu));
 }
 
-// Groups are pairs: a first number, and a bit for each of them that is left; nodes of one level have theirs in the upper byte, and
-// in the lowest which children are inner nodes.
+// Groups are pairs: a first number, and a bit for each of them that is left; nodes of one level have theirs in the
+// upper byte, and in the lowest which children are inner nodes.
 const uvec2 NOTHING = uvec2(0);
 const uint ANY_NODE = 0xff000000u;
 
@@ -132,7 +133,7 @@ bool Trace(vec3 origin, vec3 direction, out Found found)
             uint triangle = firstTriangle + number;
             Meeting meeting;
             if (MeetTriangle(sheared, FetchCorner(triangle, 0), FetchCorner(triangle, 1), FetchCorner(triangle, 2), meeting)
-                && meeting.t > 0.0 && meeting.t < nearest) {
+                && meeting.t < nearest) {
                 nearest = meeting.t;
                 found = Found(instance, number);
                 any = true;

@@ -1,8 +1,9 @@
 // Where a ray meets a triangle, watertight: Woop, Benthin & Wald, "Watertight Ray/Triangle Intersection", JCGT 2013.
 //
-// Seen along the ray a triangle's corners are points of a plane, the same for every triangle that shares them. Which side of an
-// edge the ray passes is the sign of a difference of two products. Rounding does not change the order of products: the
-// sign is right or 0, and with 0 as inside for the triangles on both sides no ray slips through an edge or a corner.
+// Seen along the ray a triangle's corners are points of a plane, the same for every triangle that shares them. Which
+// side of an edge the ray passes is the sign of a difference of two products. Rounding does not change the order of
+// products: the sign is right or 0, and with 0 as inside for the triangles on both sides no ray slips through an edge
+// or a corner.
 #ifndef TRIANGLE_GLSL
 #define TRIANGLE_GLSL
 
@@ -35,7 +36,19 @@ struct Meeting {
     bool behind;    // seen from the side where the corners are clockwise
 };
 
-// Whether the line of the ray, endless to both sides, passes through the triangle.
+// What rounding may do to a distance along a ray: this share of how far the corners are.
+const float DOUBT = 1e-6;
+
+// Whether the plane through `a`, `b` and `c` lies ahead of the origin and not behind it. It tells where the distance
+// along the ray is in doubt: a ray that has just left the plane starts beside it by no more than what rounding can
+// move a point across it, which may be far less than what it can move one along the ray.
+bool IsPlaneAhead(vec3 direction, vec3 a, vec3 b, vec3 c)
+{
+    vec3 normal = cross(b - a, c - a);
+    return (dot(a, normal) > 0.0) == (dot(direction, normal) > 0.0);
+}
+
+// Whether the ray passes through the triangle.
 bool MeetTriangle(ShearedRay ray, vec3 a, vec3 b, vec3 c, out Meeting meeting)
 {
     a = Permute(a - ray.origin, ray.axis);
@@ -56,7 +69,9 @@ bool MeetTriangle(ShearedRay ray, vec3 a, vec3 b, vec3 c, out Meeting meeting)
     meeting.weights = vec3(u, v, w) / determinant;
     meeting.t = dot(meeting.weights, vec3(a.z, b.z, c.z)) * ray.shear.z;
     meeting.behind = (determinant < 0.0) != (ray.shear.z < 0.0);
-    return true;
+    if (abs(meeting.t) > DOUBT * max(max(abs(a.z), abs(b.z)), abs(c.z)) * abs(ray.shear.z)) return meeting.t > 0.0;
+    meeting.t = max(meeting.t, 0.0);
+    return IsPlaneAhead(vec3(ray.shear.xy, 1.0) / ray.shear.z, a, b, c);
 }
 
 #endif

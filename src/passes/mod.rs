@@ -9,6 +9,7 @@ mod bvh;
 mod display;
 mod environment;
 mod geometry;
+mod probe;
 mod resources;
 mod sampling;
 mod single;
@@ -35,6 +36,7 @@ use single::Single;
 use tree::{Pending, Tree};
 
 pub use aov::Aovs;
+pub use probe::{Hit, Leaks, Ray, TraceProbe};
 pub use sampling::pixel_offsets;
 pub use tree::TreeCounts;
 

@@ -6,7 +6,9 @@ use std::collections::HashMap;
 use glam::{DAffine3, DVec3};
 
 use vitrum::options::RenderArgs;
-use vitrum::scene::{Camera, Dielectric, Environment, Material, Mesh, Object, Opaque, Scene, Surface, Surroundings};
+use vitrum::scene::{
+    Camera, Dielectric, Environment, Material, Mesh, Object, Opaque, RawMesh, Scene, Surface, Surroundings,
+};
 
 /// A body of a scene.
 #[derive(Clone, Debug)]
@@ -64,6 +66,7 @@ pub fn scene(parts: impl IntoIterator<Item = Part>) -> Scene {
         framed: false,
         lights: Vec::new(),
         materials: Vec::new(),
+        textures: Vec::new(),
         meshes: Vec::new(),
         objects: Vec::new(),
         render: RenderArgs::default(),
@@ -141,14 +144,15 @@ pub fn bumpy(triangles: usize) -> Mesh {
 fn body(name: &str, vertices: Vec<(DVec3, DVec3)>, triangles: Vec<[u32; 3]>) -> Mesh {
     let (positions, normals) =
         vertices.into_iter().map(|(p, n)| (p.as_vec3().to_array(), n.normalize().as_vec3().to_array())).unzip();
-    Mesh::new(name, positions, normals, triangles).unwrap()
+    Mesh::new(RawMesh { name: name.into(), positions, normals, triangles, ..RawMesh::default() }).unwrap()
 }
 
 /// A mesh from quads and triangles, without normals.
 fn flat(name: &str, positions: Vec<DVec3>, quads: &[[u32; 4]], triangles: &[[u32; 3]]) -> Mesh {
     let positions = positions.into_iter().map(|p| p.as_vec3().to_array()).collect();
     let halves = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]);
-    Mesh::new(name, positions, Vec::new(), halves.chain(triangles.iter().copied()).collect()).unwrap()
+    let triangles = halves.chain(triangles.iter().copied()).collect();
+    Mesh::new(RawMesh { name: name.into(), positions, triangles, ..RawMesh::default() }).unwrap()
 }
 
 /// An icosahedron with every edge cut into `frequency` pieces, as unit vectors, and its 20 * `frequency`^2 triangles.
