@@ -6,9 +6,9 @@ use std::path::Path;
 use fastrand::Rng;
 use glam::{DAffine3, DVec2, DVec3};
 
-use vitrum::optics::{fresnel::fresnel_dielectric, medium};
+use vitrum::optics::fresnel::fresnel_dielectric;
 use vitrum::options::Size;
-use vitrum::scene::{Dielectric, Mesh, Overrides, Scene, Surface, Surroundings};
+use vitrum::scene::{Dielectric, Dispersion, Mesh, Overrides, Scene, Surface, Surroundings};
 
 use crate::closest::Triangles;
 use crate::common::reference::environment_radiance;
@@ -148,12 +148,12 @@ fn a_slab_shifts_a_ray() {
 
 #[test]
 fn a_prism_deviates_least_where_the_ray_is_symmetric() {
-    let (ior, dispersion) = (1.5168, 20.0 / 64.17);
+    let glass = Dielectric { dispersion: Dispersion::Khr(20.0 / 64.17), ..glass(1.5168) };
     for apex in [0.3_f64, 0.8, 60.0_f64.to_radians()] {
-        let part = Part::of(prism(apex, 4.0), Surface::Dielectric(Dielectric { dispersion, ..glass(ior) }));
+        let part = Part::of(prism(apex, 4.0), Surface::Dielectric(glass.clone()));
         let scene = scene([part]);
         for wavelength in [None, Some(450.0), Some(650.0)] {
-            let ior = wavelength.map_or(ior, |wavelength| medium::dispersed_index(ior, dispersion, wavelength));
+            let ior = wavelength.map_or(glass.ior, |wavelength| glass.index_at(wavelength));
             let deviation = |turned: f64| {
                 // Symmetric: along +x inside, so that it falls in from below by half of the deviation.
                 let angle = (ior * (apex / 2.0).sin()).asin() - apex / 2.0 + turned;

@@ -170,13 +170,13 @@ pub struct Referee<'a> {
 
 /// What the material says at this wavelength: the one place that reads [`Dielectric`].
 fn medium_of(glass: &Dielectric, wavelength: Option<f64>) -> Medium {
-    let Dielectric { ior, dispersion, attenuation_color, attenuation_distance, .. } = *glass;
+    let Dielectric { ior, attenuation_color, attenuation_distance, .. } = *glass;
     let absorption = |color| match attenuation_distance {
         f64::INFINITY => 0.0,
         distance => medium::absorption(color, distance),
     };
     Medium {
-        index: wavelength.map_or(ior, |wavelength| medium::dispersed_index(ior, dispersion, wavelength)),
+        index: wavelength.map_or(ior, |wavelength| glass.index_at(wavelength)),
         absorption: DVec3::from_array(attenuation_color.to_array().map(absorption)),
     }
 }
