@@ -1,32 +1,20 @@
 //! The referee itself, against what is known exactly: energy, single rays through slabs, prisms and balls, stacks of
 //! media.
 
-use std::path::Path;
-
 use fastrand::Rng;
 use glam::{DAffine3, DVec2, DVec3};
 
 use vitrum::optics::fresnel::fresnel_dielectric;
 use vitrum::options::Size;
-use vitrum::scene::{Dielectric, Dispersion, Mesh, Overrides, Scene, Surface, Surroundings};
+use vitrum::scene::{Dielectric, Dispersion, Scene, Surface, Surroundings};
 
+use crate::bodies::{asset, in_the_city};
 use crate::closest::Triangles;
 use crate::common::reference::environment_radiance;
 use crate::reference::{End, LEAST_COSINE, Leaf, Referee, Sample, Settings};
 use crate::shapes::{Part, bumpy, cuboid, glass, hollow_ball, icosphere, prism, scene};
 
 const SMALL: Size = Size { width: 32, height: 24 };
-
-fn asset(name: &str) -> Mesh {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/meshes").join(name);
-    Scene::load(Some(&path), &Overrides::default()).unwrap().meshes.remove(0)
-}
-
-/// With a surrounding that differs everywhere.
-fn in_the_city(scene: Scene) -> Scene {
-    let built_in = Scene::load(None, &Overrides::default()).unwrap();
-    Scene { environment: built_in.environment, ..scene }
-}
 
 /// The ends of the tree behind a ray from outside of everything.
 fn leaves(referee: &Referee, origin: DVec3, direction: DVec3) -> Vec<Leaf> {

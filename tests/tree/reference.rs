@@ -54,8 +54,12 @@ pub struct Sample {
     pub radiance: DVec3,
     /// Throughput that was cut off, the largest of its three channels.
     pub discarded: f64,
+    /// What the environment in the directions of that would add to the radiance.
+    pub stand_in: DVec3,
     /// Rays followed.
     pub rays: u64,
+    /// Events of the whole tree but those that end a chain.
+    pub events: u64,
     /// Events of the chain with the largest throughput.
     pub interfaces: f64,
     /// Tells trees apart: the triangles that were met and what happened there, in order.
@@ -268,7 +272,9 @@ impl<'a> Referee<'a> {
         offsets.iter().map(|&offset| self.sample(size, centre + offset)).fold(Sample::default(), |mean, one| Sample {
             radiance: mean.radiance + share * one.radiance,
             discarded: mean.discarded + share * one.discarded,
+            stand_in: mean.stand_in + share * one.stand_in,
             rays: mean.rays + one.rays,
+            events: mean.events + one.events,
             interfaces: mean.interfaces + share * one.interfaces,
             signature: mix(mean.signature, one.signature),
         })
@@ -314,7 +320,10 @@ impl<'a> Referee<'a> {
                 (strongest, sample.interfaces) = (largest, interfaces.into());
             }
             sample.radiance += throughput * radiance;
-            sample.discarded += if end == End::Cut { largest } else { 0.0 };
+            if end == End::Cut {
+                sample.discarded += largest;
+                sample.stand_in += throughput * environment_radiance(&self.scene.environment, direction);
+            }
             visit(&Leaf { throughput, position, direction, interfaces, end });
         };
         let (throughput, position, inside) = (DVec3::ONE, origin, inside.to_vec());
@@ -343,6 +352,7 @@ impl<'a> Referee<'a> {
             };
             let (event, children) = self.interact(&branch, &met);
             note(met.triangle, event);
+            sample.events += u64::from(matches!(event, Event::Split | Event::TotalReflection | Event::Pane));
             match event {
                 Event::Opaque => {
                     let radiance = self.opaque_radiance(&met) / self.medium(&branch.inside).index.powi(2);
@@ -354,6 +364,7 @@ impl<'a> Referee<'a> {
             }
         }
         sample.radiance *= index * index;
+        sample.stand_in *= index * index;
         sample
     }
 

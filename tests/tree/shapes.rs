@@ -98,10 +98,47 @@ pub fn hollow_ball(level: u32, wall: f64) -> Mesh {
 
 /// A box, without normals.
 pub fn cuboid(min: DVec3, max: DVec3) -> Mesh {
-    let pick = |corner: u32, bit: u32, axis: usize| if corner >> bit & 1 == 0 { min[axis] } else { max[axis] };
-    let positions = (0..8).map(|i| DVec3::new(pick(i, 0, 0), pick(i, 1, 1), pick(i, 2, 2))).collect();
+    let pick = |corner: usize, axis: usize| if corner >> axis & 1 == 0 { min[axis] } else { max[axis] };
+    block(std::array::from_fn(|i| DVec3::new(pick(i, 0), pick(i, 1), pick(i, 2))))
+}
+
+/// A box with its corners moved, without normals: bit 0 of a corner's number says whether it lies at the end of x, bit 1
+/// of y, bit 2 of z.
+pub fn block(corners: [DVec3; 8]) -> Mesh {
     // Counter-clockwise from outside: -x, +x, -y, +y, -z, +z.
-    flat("box", positions, &[[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]], &[])
+    let sides = [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+    flat("box", corners.to_vec(), &sides, &[])
+}
+
+/// A rectangle across z, open, seen from +z as its outside.
+pub fn rectangle(width: f64, height: f64) -> Mesh {
+    let corner = |x: f64, y: f64| DVec3::new(x * width / 2.0, y * height / 2.0, 0.0);
+    let corners = vec![corner(-1.0, -1.0), corner(1.0, -1.0), corner(1.0, 1.0), corner(-1.0, 1.0)];
+    flat("rectangle", corners, &[[0, 1, 2, 3]], &[])
+}
+
+/// A body of revolution around y with `sides` flat sides. The profile, points of a radius and a height, runs from the
+/// axis at the bottom around the outside to the axis at the top.
+pub fn revolved(profile: &[(f64, f64)], sides: u32) -> Mesh {
+    let rings = profile.len() as u32 - 2;
+    let mut positions = vec![DVec3::Y * profile[0].1, DVec3::Y * profile[profile.len() - 1].1];
+    for &(radius, height) in &profile[1..profile.len() - 1] {
+        positions.extend((0..sides).map(|side| {
+            let (sine, cosine) = (std::f64::consts::TAU * f64::from(side) / f64::from(sides)).sin_cos();
+            DVec3::new(radius * cosine, height, -radius * sine)
+        }));
+    }
+    let at = |ring: u32, side: u32| 2 + ring * sides + side % sides;
+    let mut quads = Vec::new();
+    let mut triangles = Vec::new();
+    for side in 0..sides {
+        triangles.push([0, at(0, side + 1), at(0, side)]);
+        triangles.push([1, at(rings - 1, side), at(rings - 1, side + 1)]);
+        quads.extend(
+            (1..rings).map(|ring| [at(ring - 1, side), at(ring - 1, side + 1), at(ring, side + 1), at(ring, side)]),
+        );
+    }
+    flat("body of revolution", positions, &quads, &triangles)
 }
 
 /// An isosceles prism along z, its edge of angle `apex` (radians) at the top, at (0, 1); sides of length 1 from
