@@ -1,16 +1,17 @@
 //! Both ways of tracing give the same picture.
 
-use vitrum::options::{Size, Trace};
+use vitrum::options::Size;
 
 use crate::bodies::{self, in_the_city};
 use crate::device::{Device, Shot};
 
 #[test]
 fn hardware_and_software_give_the_same_picture() {
-    let Some(device) = Device::with_ray_queries() else { return };
+    let Some(device) = Device::open() else { return };
+    let [software, hardware] = device.tracers()[..] else { return device.verdict() };
     for (name, scene) in bodies::all() {
         let scene = in_the_city(scene);
-        let [hardware, software] = [Trace::Hardware, Trace::Software].map(|trace| {
+        let [hardware, software] = [hardware, software].map(|trace| {
             let size = Size { width: 64, height: 48 };
             device.picture(&scene, Shot { size, cutoff: 1e-3, trace: Some(trace), ..Shot::default() })
         });
