@@ -158,16 +158,22 @@ struct Passes {
 /// The passes of one light transport model.
 enum ModelPass {
     /// Rasterised: what is covered, what is not, the mean of both.
-    Raster { single: Single, environment: EnvironmentPass, accumulate: Accumulate },
+    Raster(Box<Raster>),
     /// Every pixel from the camera on.
     Tree(Tree),
+}
+
+struct Raster {
+    single: Single,
+    environment: EnvironmentPass,
+    accumulate: Accumulate,
 }
 
 impl ModelPass {
     /// What a sample tells the shaders beyond its place in the pixel.
     fn lit(&self, push: SamplePush, budget: Budget) -> SamplePush {
         match self {
-            Self::Raster { .. } => push,
+            Self::Raster(_) => push,
             Self::Tree(_) => sampling::spectrum(push, budget),
         }
     }
@@ -181,11 +187,11 @@ impl Passes {
         let targets = Targets::new(&gpu, small, resources, plan.model)?;
         let model = match (&targets.tree, trace) {
             (Some(tree), Some(trace)) => ModelPass::Tree(Tree::new(commands, resources, &tree.group, trace)?),
-            _ => ModelPass::Raster {
+            _ => ModelPass::Raster(Box::new(Raster {
                 single: Single::new(&gpu, resources)?,
                 environment: EnvironmentPass::new(&gpu, resources)?,
                 accumulate: Accumulate::new(&gpu, &targets)?,
-            },
+            })),
         };
         let mut passes = Self {
             model,
@@ -216,10 +222,10 @@ impl Passes {
         push: SamplePush,
     ) -> Result<Vec<PassTime>> {
         match &mut self.model {
-            ModelPass::Raster { single, environment, accumulate } => commands.run(|cmd| {
-                cmd.timed("single", |cmd| single.record(cmd, resources, targets, draws, push));
-                cmd.timed("environment", |cmd| environment.record(cmd, resources, targets, push));
-                cmd.timed("accumulate", |cmd| accumulate.record(cmd, targets, push.sample_index));
+            ModelPass::Raster(raster) => commands.run(|cmd| {
+                cmd.timed("single", |cmd| raster.single.record(cmd, resources, targets, draws, push));
+                cmd.timed("environment", |cmd| raster.environment.record(cmd, resources, targets, push));
+                cmd.timed("accumulate", |cmd| raster.accumulate.record(cmd, targets, push.sample_index));
             }),
             ModelPass::Tree(tree) => tree.sample(commands, targets, push),
         }

@@ -74,12 +74,7 @@ impl Pending {
 }
 
 impl Tree {
-    pub(super) fn new(
-        commands: &mut Commands,
-        resources: &Resources,
-        group: &BindGroup,
-        trace: Trace,
-    ) -> Result<Self> {
+    pub(super) fn new(commands: &mut Commands, resources: &Resources, group: &BindGroup, trace: Trace) -> Result<Self> {
         let (tree, lights) = match trace {
             Trace::Hardware => (&shaders::TREE_HARDWARE_COMP, &shaders::LIGHTS_HARDWARE_COMP),
             Trace::Software => (&shaders::TREE_COMP, &shaders::LIGHTS_COMP),
