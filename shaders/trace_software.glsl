@@ -61,10 +61,12 @@ uint MeetChildren(uint node, BoxRay ray, float limit, out uvec2 groups, out uint
         uvec3 first = mix(low, high, turned);
         uvec3 last = mix(high, low, turned);
         for (int shift = 0; shift < 32; shift += 8) {
-            vec3 enter = vec3(first >> shift & 0xffu) * step + near;
-            vec3 leave = vec3(last >> shift & 0xffu) * step + far;
-            float from = max(max(enter.x, enter.y), max(enter.z, 0.0));
-            float to = min(min(leave.x, leave.y), min(leave.z, limit));
+            // Numbers from 0 on have the order of their bits, and those below stay below: integers are compared in one
+            // instruction, where a CPU takes several for floats, one of which may be no number.
+            ivec3 enter = floatBitsToInt(fma(vec3(first >> shift & 0xffu), step, near));
+            ivec3 leave = floatBitsToInt(fma(vec3(last >> shift & 0xffu), step, far));
+            int from = max(max(enter.x, enter.y), max(enter.z, 0));
+            int to = min(min(leave.x, leave.y), min(leave.z, floatBitsToInt(limit)));
             if (from <= to) met |= (bits >> shift & 0xffu) << (index >> shift & 0xffu);
         }
     }
