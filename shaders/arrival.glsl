@@ -9,6 +9,7 @@
 #include "triangle.glsl"
 
 struct Arrival {
+    Found found;
     vec3 position;
     vec3 error;       // the point of the surface lies in the box position +- error
     vec3 faceNormal;  // of unit length, towards the outside of the surface
@@ -46,6 +47,7 @@ Arrival ArriveAt(Found found, vec3 origin, vec3 direction)
     }
 
     Arrival arrival;
+    arrival.found = found;
     arrival.behind = meeting.behind;
     vec3 normal = cross(b - a, c - a);
     arrival.faceNormal = normalize(mat3(instances[found.instance].normalToWorld) * normal);

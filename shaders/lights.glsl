@@ -51,6 +51,7 @@ struct LightRay {
     float reach;       // distance of a point light; infinite: the environment
     float lod;
     Whereabouts at;
+    Found left;
 };
 
 // Lights of a point: point lights, then directions to the environment for what is scattered, then for what is mirrored.
@@ -87,6 +88,7 @@ bool AskFor(uint number, Record record, Lit lit, out LightRay ray)
     ray.throughput *= record.throughput;
     ray.direction = normalize(lit.toWorld * wo);
     ray.origin = LeaveFrom(lit.arrival, ray.direction);
+    ray.left = lit.arrival.found;
     ray.at = Whereabouts(record.medium, Bodies(record.bodies));
     bool above = (dot(ray.direction, lit.arrival.faceNormal) > 0.0) != lit.arrival.behind;
     return above && Largest(ray.throughput) > 0.0;
@@ -110,6 +112,7 @@ void PassThrough(inout LightRay light, uint instance, Material material, Arrival
     light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
     light.at = boundary.beyond;
     light.origin = LeaveFrom(arrival, light.direction);
+    light.left = arrival.found;
 }
 
 void main()
@@ -119,7 +122,7 @@ void main()
     if (recordsRepeat != 0 && recordCount > recordCapacity) return;
     Sample one = samples[SampleAt(place)];
     float scale = frame.cameraIndex * frame.cameraIndex;
-    LightRay light = LightRay(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, Whereabouts(0, Bodies(uvec4(0))));
+    LightRay light = LightRay(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, Whereabouts(0, Bodies(uvec4(0))), NOWHERE);
     uint head = one.head;
     uint number = 0;
     uint passed = 0;
@@ -143,7 +146,7 @@ void main()
             Arrival arrival;
             bool any = false;
             if (light.reach == LARGEST_FLOAT || SHADOWS) {
-                any = Trace(light.origin, light.direction, found);
+                any = Trace(light.origin, light.direction, light.left, found);
                 ++one.rays;
             }
             if (any) arrival = ArriveAt(found, light.origin, light.direction);

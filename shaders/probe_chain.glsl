@@ -47,13 +47,14 @@ void main()
     uint before = chains[index].rays;
     uint misses = 0;
     uint wrongSides = 0;
+    Found left = NOWHERE;
     for (uint segment = 0; segment < SEGMENTS; ++segment) {
         uvec3 random = Pcg3d(uvec3(index, before + segment, 0));
         Found found;
         bool isInside = false;
         vec3 from = origin;
         vec3 towards = direction;
-        if (Trace(origin, direction, found)) {
+        if (Trace(origin, direction, left, found)) {
             Arrival arrival = ArriveAt(found, origin, direction);
             isInside = arrival.behind;
             if (!isInside) ++wrongSides;
@@ -64,10 +65,12 @@ void main()
                 ? DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), -arrival.faceNormal)
                 : DirectionInto(-arrival.faceNormal, random);
             origin = LeaveFrom(arrival, direction);
+            left = found;
         } else {
             ++misses;
         }
         if (!isInside) {
+            left = NOWHERE;
             for (int i = 0; i < 3; ++i) {
                 chains[index].lostOrigin[i] = from[i];
                 chains[index].lostDirection[i] = towards[i];

@@ -35,7 +35,7 @@ void main()
     vec3 origin = vec3(rays[index].origin[0], rays[index].origin[1], rays[index].origin[2]);
     vec3 direction = vec3(rays[index].direction[0], rays[index].direction[1], rays[index].direction[2]);
     Found found;
-    bool any = Trace(origin, direction, found);
+    bool any = Trace(origin, direction, NOWHERE, found);
     hits[index].object = any ? instances[found.instance].number : 0;
     if (!any) return;
     hits[index].triangle = found.triangle;

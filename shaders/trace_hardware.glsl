@@ -26,7 +26,7 @@ bool IsAhead(Found found, vec3 origin, vec3 direction, float t)
     return IsPlaneAhead(towards, a, b, c);
 }
 
-bool Trace(vec3 origin, vec3 direction, out Found found)
+bool Trace(vec3 origin, vec3 direction, Found left, out Found found)
 {
     float start = 0.0;
     for (int i = 0; i < MOST_BEHIND; ++i) {
@@ -37,7 +37,7 @@ bool Trace(vec3 origin, vec3 direction, out Found found)
         found.instance = rayQueryGetIntersectionInstanceCustomIndexEXT(query, true);
         found.triangle = rayQueryGetIntersectionPrimitiveIndexEXT(query, true);
         float t = rayQueryGetIntersectionTEXT(query, true);
-        if (IsAhead(found, origin, direction, t)) break;
+        if (found != left && IsAhead(found, origin, direction, t)) break;
         // The next number, or nearly.
         start = t * 1.000001;
     }

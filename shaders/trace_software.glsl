@@ -87,7 +87,7 @@ uint TakeNode(inout uvec2 group, uint octant)
 const uvec2 NOTHING = uvec2(0);
 const uint ANY_NODE = 0xff000000u;
 
-bool Trace(vec3 origin, vec3 direction, out Found found)
+bool Trace(vec3 origin, vec3 direction, Found left, out Found found)
 {
     uvec2 stack[TRACE_STACK];
     int top = 0;
@@ -132,6 +132,7 @@ bool Trace(vec3 origin, vec3 direction, out Found found)
                 leaves = NOTHING;
                 break;
             }
+            if (number == left.triangle && instance == left.instance) continue;
             uint triangle = firstTriangle + number;
             Meeting meeting;
             if (MeetTriangle(sheared, FetchCorner(triangle, 0), FetchCorner(triangle, 1), FetchCorner(triangle, 2), meeting)

@@ -41,17 +41,18 @@ struct Branch {
     vec3 throughput;
     uint depth;     // interfaces behind it
     Whereabouts at;
+    Found left;     // where it starts
 };
 
 Branch Child(Branch parent, Arrival arrival, vec3 direction, float share, Whereabouts at)
 {
-    return Branch(LeaveFrom(arrival, direction), direction, parent.throughput * share, parent.depth + 1, at);
+    return Branch(LeaveFrom(arrival, direction), direction, parent.throughput * share, parent.depth + 1, at, arrival.found);
 }
 
 Branch CameraBranch(vec2 pixel)
 {
     Whereabouts at = Whereabouts(frame.cameraMedium, Bodies(frame.cameraBodies));
-    return Branch(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), 0, at);
+    return Branch(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), 0, at, NOWHERE);
 }
 
 // What a pixel gathers of one tree.
@@ -143,7 +144,6 @@ void main()
     Branch waiting[TREE_STACK];
     int top = 0;
     uint passed = 0;
-    Arrival nowhere = Arrival(vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0), false, 0.0, vec3(0.0));
     uint head = 0;      // of the records that wait for their lights
     uint headBefore = 0;
 
@@ -169,7 +169,7 @@ void main()
         }
         Found found;
         vec3 direction = branch.direction;
-        bool any = Trace(branch.origin, direction, found);
+        bool any = Trace(branch.origin, direction, branch.left, found);
         ++rays;
 
         Outlook outlook = Outlook(vec3(0.0), direction, vec3(0.0), direction, 0);
@@ -225,6 +225,7 @@ void main()
                 if (passes) {
                     branch.at = boundary.beyond;
                     branch.origin = LeaveFrom(arrival, direction);
+                    branch.left = found;
                     goesOn = ++passed <= MOST_PASSED;
                 }
                 if (passes ? !goesOn : branch.depth >= frame.maxDepth) {
