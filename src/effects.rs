@@ -139,6 +139,11 @@ impl Effect {
         self.row().models.contains(&model)
     }
 
+    /// Whether `model` simulates this by something simpler: docs/tree.md says what.
+    pub fn approximated_by(self, model: Model) -> bool {
+        matches!((model, self), (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows))
+    }
+
     /// Whether something in `scene` may show this.
     pub fn called_for_by(self, scene: &Scene) -> bool {
         (self.row().called_for)(scene)

@@ -37,6 +37,8 @@ pub struct Plan {
     pub tonemap: Tonemap,
     /// Extra layers.
     pub aovs: Vec<Aov>,
+    /// Effects that the model simulates by something simpler.
+    pub approximate: Effects,
     /// Controls of the original's user interface.
     pub debug: DebugControls,
     /// Every option that was given, and the defaults of those that shape each picture.
@@ -141,6 +143,7 @@ impl Plan {
         let share = |honoured: bool| -> Effects {
             selected.iter().filter(|effect: &Effect| effect.honoured_by(model) == honoured).collect()
         };
+        let approximate = share(true).iter().filter(|effect| effect.approximated_by(model)).collect();
         Ok(Self {
             model,
             size,
@@ -155,6 +158,7 @@ impl Plan {
             exposure: args.exposure.unwrap_or(0.0),
             tonemap: args.tonemap.unwrap_or_default(),
             aovs,
+            approximate,
             debug: DebugControls::new(args),
             options: args.clone().or(RenderArgs {
                 model: Some(model),

@@ -73,6 +73,10 @@ impl RenderCommand {
             let (model, names) = (plan.model.name(), plan.unsupported.names().join(", "));
             talk.note(&format!("note: model {model} does not simulate {names}"));
         }
+        if plan.approximate != Default::default() {
+            let (model, names) = (plan.model.name(), plan.approximate.names().join(", "));
+            talk.note(&format!("note: model {model} approximates {names}; see docs/tree.md"));
+        }
         talk.detail(&format!("device: {} ({})", device.name, device.driver));
         talk.detail(&format!("options: {}", plan.options));
 
@@ -109,6 +113,9 @@ impl RenderCommand {
         }
         if stats.non_finite_pixels > 0 {
             talk.note(&format!("warning: {} pixels are not finite", stats.non_finite_pixels));
+        }
+        if let Some(note) = cut_off(&plan, &stats) {
+            talk.note(&note);
         }
         talk.note(&summary(output.path(), &stats));
         match messages.all().as_slice() {
@@ -167,6 +174,21 @@ fn idle_options(options: &RenderArgs, format: ImageFormat) -> Vec<String> {
     .filter(|(given, ..)| *given)
     .map(|(_, name, why)| format!("note: {name} changes nothing: {why}"))
     .collect()
+}
+
+/// Light that an image may lack, where that could be seen, and what follows more of it.
+fn cut_off(plan: &Plan, stats: &Stats) -> Option<String> {
+    /// Below this share of the brightest radiance few would look for it.
+    const SEEN: f32 = 0.05;
+    let (most, depth) = (stats.discarded?.max, plan.max_depth?);
+    let promised = plan.options.tolerance.map_or(SEEN, |tolerance| tolerance as f32);
+    (most > promised).then(|| {
+        let mean = stats.discarded.map_or(0.0, |discarded| discarded.mean);
+        format!(
+            "note: cut off was up to {most:.2} of a pixel's light, {mean:.4} in the mean; --max-depth above {depth} \
+             follows more of it"
+        )
+    })
 }
 
 fn progress_bar(plan: &Plan, talk: Talk) -> ProgressBar {
