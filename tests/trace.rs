@@ -340,10 +340,9 @@ fn no_ray_of_a_hundred_million_leaves_a_closed_body() {
     let Some(validated) = Validated::open() else { return };
     println!("| body | tracer | rays | misses | wrong sides | of these wrong in 64 bits |");
     println!("| --- | --- | --- | --- | --- | --- |");
-    let mut bodies = closed_bodies();
-    bodies.extend(
-        [10_000, 100_000, 1_000_000].map(|count| (format!("bumpy, {count}"), scene([Part::glass(bumpy(count), 1.5)]))),
-    );
+    let counts = [10_000, 100_000, 1_000_000];
+    let mut bodies = counts.map(|count| (format!("bumpy, {count}"), scene([Part::glass(bumpy(count), 1.5)]))).to_vec();
+    bodies.extend(closed_bodies());
     let mut sum = 0;
     for (name, scene) in bodies {
         let triangles = Triangles::new(&scene);
