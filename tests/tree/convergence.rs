@@ -8,14 +8,15 @@ use vitrum::scene::Scene;
 use crate::bodies::{self, ball, brightest, built_in, diamond, hollow, in_the_city, in_white, water_in_a_glass};
 use crate::device::{Device, Picture, Shot};
 
-const SMALL: Size = Size { width: 48, height: 36 };
+const SMALL: Size = Size { width: 32, height: 24 };
 
 #[test]
 fn what_is_discarded_falls_with_the_depth() {
     let Some(device) = Device::open() else { return };
-    for (name, scene) in bodies::all() {
+    for (name, scene) in some() {
+        let scene = in_white(scene);
         let mut before: Option<Picture> = None;
-        for depth in [1, 2, 4, 8, 16, 32] {
+        for depth in [1, 2, 4, 8, 16] {
             let picture = device.picture(&scene, Shot { size: SMALL, depth, cutoff: 1e-6, ..Shot::default() });
             if let Some(before) = before {
                 let pairs = || picture.discarded.iter().zip(&before.discarded);
@@ -70,8 +71,8 @@ fn depths_that_leave_less_than_a_ten_thousandth() {
 fn series() -> [Vec<Shot>; 2] {
     let shot = Shot { size: SMALL, ..Shot::default() };
     [
-        [2, 4, 8, 16].map(|depth| Shot { depth, cutoff: 1e-6, ..shot }).into(),
-        [1e-1, 1e-2, 1e-3, 1e-4].map(|cutoff| Shot { depth: 128, cutoff, ..shot }).into(),
+        [2, 4, 8, 16].map(|depth| Shot { depth, ..shot }).into(),
+        [1e-1, 1e-2, 1e-3, 1e-4].map(|cutoff| Shot { depth: 64, cutoff, ..shot }).into(),
     ]
 }
 
@@ -80,20 +81,21 @@ fn some() -> [(&'static str, Scene); 5] {
         ("ball", ball()),
         ("hollow ball", hollow()),
         ("teapot and cups", built_in()),
-        ("diamond", diamond()),
         ("water in a glass", water_in_a_glass()),
+        ("diamond", diamond()),
     ]
 }
 
 #[test]
 fn no_pixel_lacks_more_than_it_discards() {
     let Some(device) = Device::open() else { return };
-    for (name, scene) in some() {
+    // Diamonds take most of the time, and say nothing else.
+    for (name, scene) in some().into_iter().take(4) {
         for scene in [in_white(scene.clone()), in_the_city(scene)] {
-            let deep = device.picture(&scene, Shot { size: SMALL, depth: 128, cutoff: 1e-6, ..Shot::default() });
+            let deep = device.picture(&scene, Shot { size: SMALL, depth: 64, ..Shot::default() });
             let brightest = brightest(&scene);
             for (what, shots) in ["depth", "cut-off"].into_iter().zip(series()) {
-                let mut before = f64::INFINITY;
+                let (mut first, mut before) = (f64::INFINITY, f64::INFINITY);
                 let mut figures = Vec::new();
                 for shot in shots {
                     let picture = device.picture(&scene, shot);
@@ -102,9 +104,13 @@ fn no_pixel_lacks_more_than_it_discards() {
                     let beyond = beyond.fold(f64::NEG_INFINITY, f64::max);
                     let rmse = picture.rmse(&deep);
                     assert!(beyond < 1e-4, "{name}, {shot:?}: a pixel lacks {beyond:e} more than it discards");
-                    // An environment in the place of what is cut off may be farther from it than that of the chain before.
-                    let falls = rmse < before || brightest > 1.0 && what == "depth" && rmse < 1.2 * before;
-                    assert!(falls, "{name}, {shot:?}: RMSE {rmse:e} after {before:e}");
+                    // Under an image the environment stands in for what is cut off by the depth, and in a wall that guides light
+                    // may be farther from it after a longer chain: there only the first is the worst.
+                    let worst = if brightest > 1.0 && what == "depth" { first } else { before };
+                    assert!(rmse < worst, "{name}, {shot:?}: RMSE {rmse:e} after {worst:e}");
+                    if figures.is_empty() {
+                        first = rmse;
+                    }
                     before = rmse;
                     figures.push(format!("{rmse:.1e}"));
                 }
