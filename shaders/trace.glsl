@@ -21,13 +21,12 @@ struct Found {
 // What a ray has left that starts anywhere else.
 const Found NOWHERE = Found(0xffffffffu, 0u);
 
-layout(std430, set = 0, binding = 10) readonly buffer CornerBuffer { float corners[]; };
+layout(std430, set = 0, binding = 10) readonly buffer CornerBuffer { vec4 corners[]; };
 
 // Corner 0, 1 or 2 of a triangle, counted through all meshes, in its mesh's space.
 vec3 FetchCorner(uint triangle, uint corner)
 {
-    uint first = 9 * triangle + 3 * corner;
-    return vec3(corners[first], corners[first + 1], corners[first + 2]);
+    return corners[3 * triangle + corner].xyz;
 }
 
 #ifdef TRACE_HARDWARE

@@ -55,6 +55,11 @@ const QUAD: usize = 1;
 const EMPTY: usize = 2;
 const MESHES: [Range<u32>; 3] = [0..4, 4..6, 6..6];
 
+/// The corners as a structure reads them, with a fourth number each.
+fn padded() -> Vec<[f32; 4]> {
+    CORNERS.iter().flatten().map(|&[x, y, z]| [x, y, z, f32::NAN]).collect()
+}
+
 fn validated() -> Option<Validated> {
     let validated = Validated::open()?;
     if !validated.gpu.ray_query() {
@@ -68,7 +73,7 @@ fn validated() -> Option<Validated> {
 /// What each ray meets, in the eyes of the device.
 fn trace(commands: &mut Commands, placed: &[PlacedMesh], rays: &[Ray]) -> Result<Vec<Hit>> {
     let gpu = commands.gpu().clone();
-    let corners = commands.upload_buffer("corners", &CORNERS)?;
+    let corners = commands.upload_buffer("corners", &padded())?;
     let scene = AccelerationStructure::new(commands, &corners, &MESHES, placed)?;
     drop(corners);
     let size = size_of_val(rays) as u64 / size_of::<Ray>() as u64 * size_of::<Hit>() as u64;
@@ -211,7 +216,7 @@ fn a_scene_without_meshes_is_met_by_no_ray() {
 fn what_cannot_be_traced_is_refused() {
     let Some(validated) = Validated::open() else { return };
     let mut commands = Commands::new(&validated.gpu).expect("commands");
-    let corners = commands.upload_buffer("corners", &CORNERS).expect("upload");
+    let corners = commands.upload_buffer("corners", &padded()).expect("upload");
     if !validated.gpu.ray_query() {
         let refusal = AccelerationStructure::new(&mut commands, &corners, &MESHES, &scene()).err();
         assert!(

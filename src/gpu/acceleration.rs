@@ -16,8 +16,8 @@ use super::commands::{Accesses, BUFFER_WRITES};
 use super::error::Context;
 use super::{Buffer, BufferDesc, BufferUse, Commands, Gpu, GpuError, Recorder, Result};
 
-/// Bytes of a corner: x, y and z in 32 bits each.
-const CORNER_BYTES: u64 = 12;
+/// Bytes of a corner: x, y, z and one that is not read, in 32 bits each: shaders fetch it at once.
+const CORNER_BYTES: u64 = 16;
 /// Bytes of a triangle: its three corners.
 const TRIANGLE_BYTES: u64 = 3 * CORNER_BYTES;
 
@@ -48,7 +48,7 @@ pub struct AccelerationStructure {
 impl AccelerationStructure {
     /// Builds both levels and waits for them.
     ///
-    /// `corners` is a [storage buffer](BufferUse::Storage) of triangles, nine 32-bit floats each; a mesh is a range
+    /// `corners` is a [storage buffer](BufferUse::Storage) of triangles, twelve 32-bit floats each; a mesh is a range
     /// of them. The buffer is not needed afterwards. Meshes without triangles and scenes without meshes are met by no
     /// ray.
     ///

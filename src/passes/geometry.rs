@@ -27,7 +27,7 @@ pub(super) struct Geometry {
     pub(super) draws: Vec<Draw>,
     /// Texture coordinates, as the mesh has them.
     pub(super) uvs: Vec<f32>,
-    /// For tracing: the corners of each triangle, in the order of the triangles.
+    /// For tracing: the corners of each triangle, in the order of the triangles, four numbers each.
     pub(super) corners: Vec<f32>,
     /// For tracing in software: the hierarchy over the instances, then one a mesh.
     pub(super) nodes: Vec<Node>,
@@ -140,7 +140,7 @@ impl Geometry {
             place.depth = bvh.depth;
         }
         if trace.is_some() {
-            self.corners.extend(triangles.iter().flat_map(corners).flatten());
+            self.corners.extend(triangles.iter().flat_map(corners).flat_map(|[x, y, z]| [x, y, z, 0.0]));
         }
         self.triangles.extend(triangles.iter().flatten());
         self.meshes.push(place.first_triangle..(self.triangles.len() / 3) as u32);
