@@ -160,7 +160,7 @@ enum ModelPass {
     /// Rasterised: what is covered, what is not, the mean of both.
     Raster(Box<Raster>),
     /// Every pixel from the camera on.
-    Tree(Tree),
+    Tree(Box<Tree>),
 }
 
 struct Raster {
@@ -186,7 +186,7 @@ impl Passes {
         let small = Size { width: 16, height: 16 };
         let targets = Targets::new(&gpu, small, resources, plan.model)?;
         let model = match (&targets.tree, trace) {
-            (Some(tree), Some(trace)) => ModelPass::Tree(Tree::new(commands, resources, &tree.group, trace)?),
+            (Some(tree), Some(trace)) => ModelPass::Tree(Box::new(Tree::new(commands, resources, &tree.group, trace)?)),
             _ => ModelPass::Raster(Box::new(Raster {
                 single: Single::new(&gpu, resources)?,
                 environment: EnvironmentPass::new(&gpu, resources)?,
