@@ -90,15 +90,20 @@ vec2 TransmittedSquared(vec3 contrast, vec2 tangential)
     return vec2(high, low);
 }
 
-// The share of light that passes, from both cosines: no difference of nearly equal numbers is in it.
-float FresnelTransmittance(float cosThetaI, float cosThetaT, float etaI, float etaT)
+// The share of light that passes, from both cosines and the first one's sine, squared: no difference of nearly equal numbers is in it.
+float FresnelTransmittance(float cosThetaI, float sinThetaI2, float cosThetaT, float etaI, float etaT)
 {
     float i = etaI * cosThetaI;
     float t = etaT * cosThetaT;
     // sin 2 thetaI sin 2 thetaT / sin^2 (thetaI + thetaT), and the same over cos^2 (thetaI - thetaT).
     float through = 2.0 * (i / (i + t)) * (t / (i + t));
-    float difference = etaT / (cosThetaI * t + etaI * ((1.0 - cosThetaI) * (1.0 + cosThetaI)));
+    float difference = etaT / (cosThetaI * t + etaI * sinThetaI2);
     return min(through + through * difference * difference, 1.0);
+}
+
+float FresnelTransmittance(float cosThetaI, float cosThetaT, float etaI, float etaT)
+{
+    return FresnelTransmittance(cosThetaI, (1.0 - cosThetaI) * (1.0 + cosThetaI), cosThetaT, etaI, etaT);
 }
 
 // The interface at an angle of incidence of cosine `cosThetaI`, 0 to 1, a pair.
@@ -130,12 +135,15 @@ Interface FresnelDielectric(vec2 cosThetaI, float etaI, float etaT)
 
     // etaT cos(thetaI -+ thetaT) is the difference or the sum of these two.
     float cosines = cosine * t.x;
-    float sines = etaI * ((1.0 - cosine) * (1.0 + cosine));
+    // Seen from a very dense side everything happens next to a cosine of 1, where the rest of it is most of the sine.
+    precise float sinThetaI2 = ((1.0 - cosine) - cosThetaI.y) * ((1.0 + cosine) + cosThetaI.y);
+    sinThetaI2 = max(sinThetaI2, 0.0);
+    float sines = etaI * sinThetaI2;
     float ratio = (cosines - sines) / (cosines + sines);
     float reflectance = min(0.5 * (perpendicular + perpendicular * ratio * ratio), 1.0);
 
     float cosThetaT = (t.x + t.y) / etaT;
-    return Interface(reflectance, FresnelTransmittance(cosine, cosThetaT, etaI, etaT), cosThetaT, false);
+    return Interface(reflectance, FresnelTransmittance(cosine, sinThetaI2, cosThetaT, etaI, etaT), cosThetaT, false);
 }
 
 Interface FresnelDielectric(float cosThetaI, float etaI, float etaT)
