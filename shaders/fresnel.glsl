@@ -171,7 +171,8 @@ vec2 CosineBetween(vec3 a, vec3 b)
     vec2 lengthB = CompensatedDot(b, b);
     precise float excess = ((lengthA.x - 1.0) + lengthA.y) + ((lengthB.x - 1.0) + lengthB.y);
     vec2 cosine = CompensatedDot(a, b);
-    return vec2(cosine.x, cosine.y - 0.5 * excess * cosine.x);
+    // Of grazing directions the products cancel, and what is left of their rounding is more than a rounding of the sum.
+    return TwoSum(cosine.x, cosine.y - 0.5 * excess * cosine.x);
 }
 
 // The refracted direction, away from the surface, and the interface that it crosses. `wi` and `n` are of unit length and on one

@@ -55,7 +55,7 @@ fn open_surfaces_lose_no_light() {
                 device.picture(&scene(parts), Shot { size: SMALL, depth: 16, cutoff: 1e-4, ..Shot::default() });
             let lack = largest_lack(&picture);
             println!("{name}, {count}: 1 within {lack:.1e}, {:.1e} discarded", picture.most_discarded());
-            assert!(lack < 1e-4, "{name}, {count}: {lack:e}");
+            assert!(lack < 1e-5, "{name}, {count}: {lack:e}");
         }
     }
     device.verdict();
@@ -72,7 +72,7 @@ fn unusual_indices_lose_no_light() {
             );
             let lack = largest_lack(&picture);
             println!("{name}, index {ior}: 1 within {lack:.1e}");
-            assert!(lack < 1e-4, "{name}, index {ior}: {lack:e}");
+            assert!(lack < 1e-5, "{name}, index {ior}: {lack:e}");
         }
     }
     device.verdict();

@@ -48,8 +48,8 @@ fn no_light_is_lost_or_made_in_a_white_furnace() {
             let brightest = picture.radiance.iter().map(|value| value.max_element()).fold(0.0, f64::max);
             let discarded = picture.most_discarded();
             println!("{name}, depth {depth}: 1 within {lack:.1e}, at most {brightest:.7}, discarded {discarded:.1e}");
-            assert!(lack < 1e-4, "{name}, depth {depth}: {lack:e} is lost or made");
-            assert!(brightest < 1.0 + 1e-4, "{name}, depth {depth}: {brightest}");
+            assert!(lack < 1e-5, "{name}, depth {depth}: {lack:e} is lost or made");
+            assert!(brightest < 1.0 + 1e-5, "{name}, depth {depth}: {brightest}");
             assert!(picture.interfaces.iter().any(|&count| count > 0.0), "{name}: nothing was met");
         }
     }

@@ -152,7 +152,7 @@ fn faces_that_coincide_lose_no_light() {
         let pixels = picture.radiance.iter().zip(&picture.discarded);
         let lack = pixels.map(|(value, cut)| (value + *cut - 1.0).abs().max_element()).fold(0.0, f64::max);
         println!("{name}: 1 within {lack:.1e}, {:.1e} discarded", picture.most_discarded());
-        assert!(lack < 1e-4, "{name}: {lack:e}");
+        assert!(lack < 1e-5, "{name}: {lack:e}");
     }
     device.verdict();
 }
