@@ -190,7 +190,8 @@ Refraction Refract(vec3 wi, vec3 n, float etaI, float etaT)
     Interface crossed = FresnelDielectric(cosThetaI, etaI, etaT);
     if (crossed.total) return Refraction(vec3(0.0), crossed);
     if (etaI == etaT) return Refraction(-wi, crossed); // nothing bends, also where rounding would
-    vec3 tangential = wi - cosThetaI.x * n;
+    // Without the correction of the length: where the normal is an axis nothing of wi is left along it.
+    vec3 tangential = wi - CompensatedDot(wi, n).x * n;
     return Refraction(-(etaI / etaT) * tangential - crossed.cosThetaT * n, crossed);
 }
 
