@@ -15,9 +15,6 @@
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
-// Nanometres, where no wavelength is told from the others.
-const float D_LINE = 587.6;
-
 // Shares of light below this are none.
 const float LEAST_SHARE = 1e-6;
 

@@ -8,6 +8,9 @@
 #include "shared.glsl"
 #include "trace.glsl"
 
+// Nanometres, where no wavelength is told from the others.
+const float D_LINE = 587.6;
+
 // Up to eight ranks of 16 bits, the highest first, 0 for none. A body that a ray entered twice is there twice.
 struct Bodies {
     uvec4 ranks;

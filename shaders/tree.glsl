@@ -22,6 +22,7 @@
 #include "records.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
+
 // Pixels in a row of a workgroup's that one invocation takes, one after the other; as in src/passes/tree.rs.
 const int PIXELS = 8;
 
@@ -31,9 +32,6 @@ const int TREE_STACK = 16;
 // A tree that cut off more than it may is followed once more with a cut-off so many times smaller, down to what no image shows.
 const float CUTOFF_STEP = 8.0;
 const float LEAST_CUTOFF = 1e-9;
-
-// Nanometres, where no wavelength is told from the others.
-const float D_LINE = 587.6;
 
 struct Branch {
     vec3 origin;
@@ -98,7 +96,7 @@ vec3 MirroredShare(Material material, Found found, Arrival arrival, vec3 wi, vec
 }
 
 // Leaves it to lights.glsl what else an opaque surface does with the light that reaches it.
-void Leave(ivec2 place, inout uint head, inout Gathered gathered, Found found, Branch branch, uint line)
+void Leave(inout uint head, inout Gathered gathered, Found found, Branch branch, uint line)
 {
     uint number = atomicAdd(recordCount, 1);
     if (number >= recordCapacity) {
@@ -144,8 +142,9 @@ void main()
     Branch waiting[TREE_STACK];
     int top = 0;
     uint passed = 0;
-    uint head = 0;      // of the records that wait for their lights
-    uint headBefore = 0;
+    uint head = 0;              // of the records that wait for their lights
+    uint headBefore = 0;        // the same when the tree began: there it begins once more
+    uint interfacesBefore = 0;
 
     for (;;) {
         if (next == NEXT_PIXEL) {
@@ -156,7 +155,7 @@ void main()
             disperses = false;
             radiance = discarded = vec3(0.0);
             cutoff = frame.cutoff;
-            head = headBefore = 0;
+            head = headBefore = interfacesBefore = 0;
             next = NEXT_TREE;
         }
         if (next == NEXT_TREE) {
@@ -165,6 +164,7 @@ void main()
             top = 0;
             passed = 0;
             head = headBefore;
+            interfaces = interfacesBefore;
             next = NEXT_BRANCH;
         }
         Found found;
@@ -213,7 +213,7 @@ void main()
                 // Light is given as it is in the medium that the surface lies in.
                 float index = IndexOf(branch.at.medium, wavelength, disperses);
                 gathered.radiance += branch.throughput * material.emission / (index * index);
-                Leave(place, head, gathered, found, branch, line);
+                Leave(head, gathered, found, branch, line);
                 branch.throughput *= MirroredShare(material, found, arrival, wi, normal);
                 if (Largest(branch.throughput) > 0.0) {
                     vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
@@ -292,6 +292,7 @@ void main()
             next = NEXT_TREE;
             cutoff = frame.cutoff;
             headBefore = head;
+            interfacesBefore = interfaces;
             if (!DISPERSION || !disperses || ++line == wavelengths) {
                 float scale = frame.cameraIndex * frame.cameraIndex;
                 Sample one = Sample(scale * vec4(radiance, Largest(discarded)), interfaces, rays, head, uint(disperses));

@@ -196,7 +196,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = range::max_depth)]
     pub max_depth: Option<u32>,
 
-    /// Model tree: cut branches so that no pixel discards more than X of the light
+    /// Model tree: no pixel discards more than X of the light, but for chains beyond --max-depth
     #[arg(long, value_name = "X", value_parser = range::positive)]
     pub tolerance: Option<f64>,
 

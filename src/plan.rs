@@ -76,6 +76,9 @@ const MOST_SAMPLES: u32 = 1 << 20;
 /// Visible normals that all samples of a pixel should take of a rough surface.
 const NORMALS: u32 = 256;
 
+/// Visible normals that one sample takes, at least and at most.
+const NORMALS_A_SAMPLE: RangeInclusive<u32> = 8..=16;
+
 /// The longest chain of interfaces, where the user has no wish.
 const DEPTH: u32 = 32;
 
@@ -84,9 +87,6 @@ const DEPTH_OF_TOLERANCE: u32 = 1024;
 
 /// Throughput below which `tree` cuts a branch off, where no tolerance is asked for.
 const CUTOFF: f64 = 0.005;
-
-/// Visible normals that one sample takes, at least and at most.
-const NORMALS_A_SAMPLE: RangeInclusive<u32> = 8..=16;
 
 impl Model {
     /// Whether it follows rays from surface to surface.

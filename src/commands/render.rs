@@ -185,7 +185,7 @@ fn cut_off(plan: &Plan, stats: &Stats) -> Option<String> {
     (most > promised).then(|| {
         let mean = stats.discarded.map_or(0.0, |discarded| discarded.mean);
         format!(
-            "note: cut off was up to {most:.2} of a pixel's light, {mean:.4} in the mean; --max-depth above {depth} \
+            "note: cut off was up to {most:.4} of a pixel's light, {mean:.4} in the mean; --max-depth above {depth} \
              follows more of it"
         )
     })

@@ -76,7 +76,7 @@ pub struct InstanceRecord {
     pub smooth_normals: u32,
     pub number: u32,
     pub rank: u32,
-    pub mesh: u32,
+    pub padding: u32,
 }
 
 /// `Material`: a surface and what is behind it.

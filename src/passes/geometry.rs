@@ -86,7 +86,7 @@ impl Geometry {
                 smooth_normals: u32::from(object.smooth && !mesh.normals.is_empty()),
                 number: object.number as u32 + 1,
                 rank: ranks[number],
-                mesh: object.mesh as u32,
+                padding: 0,
             });
             if trace == Some(Trace::Hardware) {
                 all.placed.push(PlacedMesh { mesh: object.mesh, object_to_world });

@@ -67,12 +67,26 @@ impl Resources {
         };
         let levels = levels(commands.gpu(), panorama, scene, plan);
         let environment = upload_panorama(commands, panorama, levels)?;
+        let ranked = ranked_materials(scene, &geometry);
+        if ranked.len() > 1 << 16 {
+            return Err(GpuError::TooLarge {
+                what: "the number of dielectric objects".into(),
+                size: (ranked.len() - 1).to_string(),
+                limit: "65535".into(),
+                advice: "join objects of one material into one mesh",
+            });
+        }
+        let nests = trace.is_some() && plan.effects.contains(Effect::Nesting);
+        let around = if nests { ranks_around_camera(scene, &geometry) } else { [0; 8] };
+        let medium = (around[0] > 0).then(|| ranked[around[0] as usize]);
         let frame = Frame {
             environment_size: [panorama.width, panorama.height],
             environment_levels: levels,
+            camera_bodies: std::array::from_fn(|i| around[2 * i] << 16 | around[2 * i + 1]),
+            camera_index: medium.map_or(1.0, |medium| materials[medium as usize].refraction_index),
+            camera_medium: medium.map_or(0, |medium| medium + 1),
             ..frame(scene, plan, &view, lights.len() as u32)
         };
-        let ranked = ranked_materials(scene, &geometry);
         let texels = if plan.effects.contains(Effect::Textures) { texels(&scene.textures) } else { Vec::new() };
         let buffers = vec![
             commands.upload_buffer("frame", &[frame])?,
@@ -223,20 +237,14 @@ fn ranked_materials(scene: &Scene, geometry: &Geometry) -> Vec<u32> {
     materials
 }
 
-/// The ranks of the bodies around the camera, as `shaders/media.glsl` holds them.
-fn camera_bodies(scene: &Scene) -> [u32; 4] {
-    let ranks = scene.ranks();
-    let mut inside: Vec<u32> = scene.bodies_around_camera().into_iter().map(|object| ranks[object]).collect();
-    inside.sort_unstable_by(|a, b| b.cmp(a));
-    inside.resize(8, 0);
-    std::array::from_fn(|i| inside[2 * i] << 16 | inside[2 * i + 1])
-}
-
-/// The material around the camera.
-fn camera_medium(scene: &Scene) -> Option<usize> {
-    let ranks = scene.ranks();
-    let highest = scene.bodies_around_camera().into_iter().max_by_key(|&object| ranks[object]);
-    highest.map(|object| scene.objects[object].material)
+/// The ranks of the bodies around the camera, the highest first, as many as `shaders/media.glsl` holds; 0: none.
+fn ranks_around_camera(scene: &Scene, geometry: &Geometry) -> [u32; 8] {
+    let inside = scene.bodies_around_camera();
+    let placed = geometry.instances.iter().zip(&geometry.objects);
+    let mut ranks: Vec<u32> =
+        placed.filter(|(_, object)| inside.contains(object)).map(|(instance, _)| instance.rank).collect();
+    ranks.sort_unstable_by(|a, b| b.cmp(a));
+    std::array::from_fn(|i| ranks.get(i).copied().unwrap_or(0))
 }
 
 /// Whether light is spread by a surface of that material.
@@ -261,8 +269,6 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         Surroundings::Image(_) => DVec3::splat(environment.intensity),
         Surroundings::Color(color) => color * environment.intensity,
     };
-    let nests = plan.model.traces() && plan.effects.contains(Effect::Nesting);
-    let medium = if nests { camera_medium(scene) } else { None };
     Frame {
         view_projection: Frame::columns(view.view_projection),
         ray_corner: view.ray_corner.as_vec3(),
@@ -286,17 +292,7 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         max_depth: plan.max_depth.unwrap_or(1),
         cutoff: plan.cutoff as f32,
         tolerance: plan.tolerance as f32,
-        camera_bodies: if nests { camera_bodies(scene) } else { [0; 4] },
-        camera_index: medium.map_or(1.0, |medium| index(&scene.materials[medium])),
-        camera_medium: medium.map_or(0, |medium| medium as u32 + 1),
         ..Frame::default()
-    }
-}
-
-fn index(material: &Material) -> f32 {
-    match &material.surface {
-        Surface::Dielectric(glass) => glass.ior as f32,
-        Surface::Opaque(_) => 1.0,
     }
 }
 
