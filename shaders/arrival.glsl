@@ -17,6 +17,8 @@ struct Arrival {
     bool behind;      // seen from the inside
     float distance;   // from where the ray started
     vec3 weights;     // of the triangle's corners
+    mat2x3 edges;     // from the first corner to the others
+    mat2x3 bends;     // how the interpolated normal changes along them, but for its length
 };
 
 // Bounds of relative errors after 5 and 7 roundings: Higham 2002, lemma 3.1.
@@ -26,6 +28,13 @@ const float GAMMA_7 = 4.1723269e-7;
 mat3 Magnitude(mat4x3 m)
 {
     return mat3(abs(m[0]), abs(m[1]), abs(m[2]));
+}
+
+// The vertices of the triangle that was found.
+uvec3 VerticesOf(Found found)
+{
+    uint first = 3 * (instances[found.instance].firstTriangle + found.triangle);
+    return instances[found.instance].firstVertex + uvec3(triangles[first], triangles[first + 1], triangles[first + 2]);
 }
 
 // Where the ray from `origin`, of a direction of unit length, meets the triangle.
@@ -70,15 +79,22 @@ Arrival ArriveAt(Found found, vec3 origin, vec3 direction)
     arrival.position = toWorld * vec4(local, 1.0);
     arrival.distance = distance(arrival.position, origin);
 
+    arrival.edges = mat2x3(mat3(toWorld) * (b - a), mat3(toWorld) * (c - a));
     arrival.normal = arrival.faceNormal;
+    arrival.bends = mat2x3(0.0);
     if (instances[found.instance].smoothNormals != 0) {
-        uint first = instances[found.instance].firstVertex;
-        uvec3 vertices = first + uvec3(triangles[3 * triangle], triangles[3 * triangle + 1], triangles[3 * triangle + 2]);
+        uvec3 vertices = VerticesOf(found);
         vec3 w = meeting.weights;
-        vec3 interpolated = w.x * FetchNormal(vertices.x) + w.y * FetchNormal(vertices.y) + w.z * FetchNormal(vertices.z);
-        interpolated = mat3(instances[found.instance].normalToWorld) * interpolated;
+        vec3 first = FetchNormal(vertices.x);
+        vec3 second = FetchNormal(vertices.y);
+        vec3 third = FetchNormal(vertices.z);
+        mat3 normalToWorld = mat3(instances[found.instance].normalToWorld);
+        vec3 interpolated = normalToWorld * (w.x * first + w.y * second + w.z * third);
         float size = length(interpolated);
-        if (size > 0.0) arrival.normal = interpolated / size;
+        if (size > 0.0) {
+            arrival.normal = interpolated / size;
+            arrival.bends = mat2x3(normalToWorld * (second - first), normalToWorld * (third - first)) * (1.0 / size);
+        }
     }
     return arrival;
 }

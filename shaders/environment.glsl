@@ -5,6 +5,7 @@
 
 #extension GL_EXT_samplerless_texture_functions : require
 #include "constants.glsl"
+#include "filter.glsl"
 #include "shared.glsl"
 
 // Constants beyond those of effects.glsl start at 64.
@@ -64,15 +65,40 @@ vec3 SampleEnvironmentImage(vec2 uv, Level level)
     return mix(top, bottom, weight.y);
 }
 
+// Where in the image `direction` points to, of any length above 0.
+vec2 EnvironmentPlace(vec3 direction)
+{
+    float u = Atan2(direction.x, -direction.z) / (2.0 * PI) + frame.environmentTurn;
+    float v = Atan2(length(direction.xz), direction.y) / PI;
+    return vec2(u - floor(u), v);
+}
+
 // Radiance arriving from `direction`, of any length above 0. `lod` is the level of the image, a whole number from 0.
 vec3 SampleEnvironment(vec3 direction, float lod)
 {
     if (!ENVIRONMENT_IMAGE) return frame.environmentRadiance;
-    float u = Atan2(direction.x, -direction.z) / (2.0 * PI) + frame.environmentTurn;
-    float v = Atan2(length(direction.xz), direction.y) / PI;
-    vec2 uv = vec2(u - floor(u), v);
-    vec3 radiance = SampleEnvironmentImage(uv, EnvironmentLevel(int(lod)));
-    return frame.environmentRadiance * radiance;
+    return frame.environmentRadiance * SampleEnvironmentImage(EnvironmentPlace(direction), EnvironmentLevel(int(lod)));
+}
+
+// The mean radiance arriving from the parallelogram of directions around `direction` whose sides are the columns of `sides`. Rows
+// of texels have the same height everywhere; towards the poles columns get narrower, and there less is averaged than might be.
+vec3 SampleEnvironment(vec3 direction, mat2x3 sides, int longest)
+{
+    if (!ENVIRONMENT_IMAGE) return frame.environmentRadiance;
+    sides *= float(frame.environmentSize.y) / PI;
+    Row row = RowOver(dot(sides[0], sides[0]), dot(sides[0], sides[1]), dot(sides[1], sides[1]), longest);
+    vec3 axis = sides * row.axis * (PI / float(frame.environmentSize.y));
+    float lod = min(row.lod, float(frame.environmentLevels - 1));
+    int fine = int(lod);
+    float coarse = lod - float(fine);
+    vec3 sum = vec3(0.0);
+    for (int i = 0; i < row.count; ++i) {
+        vec2 uv = EnvironmentPlace(direction + PlaceInRow(row, i) * axis);
+        vec3 radiance = SampleEnvironmentImage(uv, EnvironmentLevel(fine));
+        if (coarse > 0.0) radiance = mix(radiance, SampleEnvironmentImage(uv, EnvironmentLevel(fine + 1)), coarse);
+        sum += radiance;
+    }
+    return frame.environmentRadiance * sum / float(row.count);
 }
 
 // The level whose texels, with the interpolation between them that doubles their area, are as wide as a cone of `solidAngle`. It

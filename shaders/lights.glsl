@@ -35,7 +35,8 @@ Lit LitAt(Record record)
     vec3 normal = lit.arrival.behind ? -lit.arrival.normal : lit.arrival.normal;
     lit.toWorld = BasisAround(NormalTowards(normal, -record.direction));
     lit.wi = normalize(-record.direction * lit.toWorld);
-    vec3 color = BaseColor(material, found, lit.arrival.weights);
+    mat2 sides = mat2(unpackHalf2x16(record.footprint.x), unpackHalf2x16(record.footprint.y));
+    vec3 color = BaseColor(material, found, lit.arrival.weights, sides);
     lit.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
     return lit;
 }

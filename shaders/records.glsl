@@ -2,9 +2,9 @@
 #ifndef RECORDS_GLSL
 #define RECORDS_GLSL
 
+#include "arrival.glsl"
 #include "effects.glsl"
 #include "texture.glsl"
-#include "trace.glsl"
 
 struct Record {
     vec3 origin;      // of the ray that found it
@@ -16,7 +16,7 @@ struct Record {
     uvec4 bodies;
     uint medium;
     uint line;        // wavelength
-    uvec2 padding;
+    uvec2 footprint;  // of the pixel in a texture's coordinates: half floats, two for each side
 };
 
 layout(std430, set = 0, binding = 17) buffer RecordBuffer {
@@ -27,15 +27,13 @@ layout(std430, set = 0, binding = 17) buffer RecordBuffer {
     Record records[];
 };
 
-// The colour of an opaque surface at a point of the triangle that was found.
-vec3 BaseColor(Material material, Found found, vec3 weights)
+// The colour of an opaque surface at a point of the triangle that was found; `sides` of what the pixel sees of it in the texture's
+// coordinates.
+vec3 BaseColor(Material material, Found found, vec3 weights, mat2 sides)
 {
     if (!TEXTURES || material.texture == 0) return material.baseColor;
-    uint first = 3 * (instances[found.instance].firstTriangle + found.triangle);
-    uvec3 vertices = instances[found.instance].firstVertex + uvec3(triangles[first], triangles[first + 1], triangles[first + 2]);
-    vec2 uv = weights.x * coordinates[vertices.x] + weights.y * coordinates[vertices.y]
-        + weights.z * coordinates[vertices.z];
-    return SampleTexture(material.texture, uv);
+    uvec3 vertices = VerticesOf(found);
+    return SampleTexture(material.texture, CoordinatesOf(vertices) * weights, sides);
 }
 
 #endif

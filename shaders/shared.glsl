@@ -88,6 +88,8 @@ layout(push_constant) uniform Push {
     uint sampleIndex;
     uint firstRow;             // of the rows that are traced
     uint wavelengths;          // that a sample takes
+    float footprint;           // how wide its share of a pixel is, 0 to 1
+    uint pushPadding[3];
     vec4 spectrum[4];          // of each its colour, and nanometres
 };
 

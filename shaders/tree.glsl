@@ -15,6 +15,7 @@
 #include "camera.glsl"
 #include "effects.glsl"
 #include "environment.glsl"
+#include "footprint.glsl"
 #include "fresnel.glsl"
 #include "media.glsl"
 #include "opaque.glsl"
@@ -40,17 +41,21 @@ struct Branch {
     uint depth;     // interfaces behind it
     Whereabouts at;
     Found left;     // where it starts
+    Differentials differentials;
 };
 
-Branch Child(Branch parent, Arrival arrival, vec3 direction, float share, Whereabouts at)
+Branch Child(Branch parent, Arrival arrival, vec3 direction, Differentials differentials, float share, Whereabouts at)
 {
-    return Branch(LeaveFrom(arrival, direction), direction, parent.throughput * share, parent.depth + 1, at, arrival.found);
+    vec3 origin = LeaveFrom(arrival, direction);
+    return Branch(origin, direction, parent.throughput * share, parent.depth + 1, at, arrival.found, differentials);
 }
 
 Branch CameraBranch(vec2 pixel)
 {
     Whereabouts at = Whereabouts(frame.cameraMedium, Bodies(frame.cameraBodies));
-    return Branch(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), 0, at, NOWHERE);
+    Differentials differentials = NO_DIFFERENTIALS;
+    if (FOOTPRINTS) differentials = CameraDifferentials(pixel, footprint);
+    return Branch(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), 0, at, NOWHERE, differentials);
 }
 
 // What a pixel gathers of one tree.
@@ -60,43 +65,47 @@ struct Gathered {
     float faint;       // the share of that which was cut off for its throughput
 };
 
-// The environment towards a direction that waits to be looked up, and towards another: two at most a turn.
-struct Outlook {
+// The environment towards a direction that waits to be looked up, as wide as a footprint.
+struct Look {
     vec3 throughput;
     vec3 direction;
-    vec3 otherThroughput;
-    vec3 otherDirection;
+    mat2x3 sides;
+};
+
+// Two at most a turn.
+struct Outlook {
+    Look next;
+    Look other;
     uint count;
 };
 
-void LookTowards(inout Outlook outlook, vec3 throughput, vec3 direction)
+void LookTowards(inout Outlook outlook, vec3 throughput, vec3 direction, mat2x3 sides)
 {
-    outlook.otherThroughput = outlook.throughput;
-    outlook.otherDirection = outlook.direction;
-    outlook.throughput = throughput;
-    outlook.direction = direction;
+    outlook.other = outlook.next;
+    outlook.next = Look(throughput, direction, sides);
     ++outlook.count;
 }
 
 // Counts what is cut off. In the place of what it would have found stands the environment in its direction; a constant
 // environment is a furnace, which shows what is lost only if nothing replaces it.
-void Discard(inout Gathered gathered, inout Outlook outlook, vec3 throughput, vec3 direction)
+void Discard(inout Gathered gathered, inout Outlook outlook, vec3 throughput, vec3 direction, Differentials differentials)
 {
     gathered.discarded += Largest(throughput);
-    if (ENVIRONMENT_IMAGE) LookTowards(outlook, throughput, direction);
+    if (ENVIRONMENT_IMAGE) LookTowards(outlook, throughput, direction, differentials.direction);
 }
 
 // ---- opaque surfaces -----------------------------------------------------------------------------------------------------------
 
 // What a mirror-like surface mirrors, of each channel; 0 where it is none.
-vec3 MirroredShare(Material material, Found found, Arrival arrival, vec3 wi, vec3 normal)
+vec3 MirroredShare(Material material, Arrival arrival, mat2 sides, vec3 wi, vec3 normal)
 {
-    OpaqueSurface surface = OpaqueSurfaceOf(BaseColor(material, found, arrival.weights), material.metallic, material.roughness, material.specular);
+    vec3 color = BaseColor(material, arrival.found, arrival.weights, sides);
+    OpaqueSurface surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
     return IsSpecular(surface) && IsMirror(surface) ? FacetReflectance(surface, dot(wi, normal)) : vec3(0.0);
 }
 
 // Leaves it to lights.glsl what else an opaque surface does with the light that reaches it.
-void Leave(inout uint head, inout Gathered gathered, Found found, Branch branch, uint line)
+void Leave(inout uint head, inout Gathered gathered, Found found, Branch branch, uint line, mat2 sides)
 {
     uint number = atomicAdd(recordCount, 1);
     if (number >= recordCapacity) {
@@ -104,7 +113,7 @@ void Leave(inout uint head, inout Gathered gathered, Found found, Branch branch,
         return;
     }
     records[number] = Record(branch.origin, head, branch.direction, found.instance, branch.throughput, found.triangle, branch.at.bodies.ranks,
-        branch.at.medium, line, uvec2(0));
+        branch.at.medium, line, uvec2(packHalf2x16(sides[0]), packHalf2x16(sides[1])));
     head = number + 1;
 }
 
@@ -172,10 +181,11 @@ void main()
         bool any = Trace(branch.origin, direction, branch.left, found);
         ++rays;
 
-        Outlook outlook = Outlook(vec3(0.0), direction, vec3(0.0), direction, 0);
+        Look nowhere = Look(vec3(0.0), direction, mat2x3(0.0));
+        Outlook outlook = Outlook(nowhere, nowhere, 0);
         bool goesOn = false;
         if (!any) {
-            if (frame.environmentVisible != 0 || branch.depth > 0) LookTowards(outlook, branch.throughput, direction);
+            if (frame.environmentVisible != 0 || branch.depth > 0) LookTowards(outlook, branch.throughput, direction, branch.differentials.direction);
         } else {
             Arrival arrival = ArriveAt(found, branch.origin, direction);
             Material material = materials[instances[found.instance].material];
@@ -194,6 +204,12 @@ void main()
             vec3 wi = -direction;
             vec3 faceNormal = arrival.behind ? -arrival.faceNormal : arrival.faceNormal;
             vec3 normal = NormalTowards(arrival.behind ? -arrival.normal : arrival.normal, wi);
+            Differentials before = branch.differentials;
+            mat2x3 normals = mat2x3(0.0);
+            if (FOOTPRINTS) {
+                before = branch.differentials = Transferred(before, direction, arrival);
+                if (!passes) normals = NormalDifferentials(arrival, normal, before.position);
+            }
             Refraction refraction = Refraction(vec3(0.0), Interface(0.0, 1.0, 1.0, false));
             float reflectance = 0.0;
             float transmittance = 1.0;
@@ -213,13 +229,20 @@ void main()
                 // Light is given as it is in the medium that the surface lies in.
                 float index = IndexOf(branch.at.medium, wavelength, disperses);
                 gathered.radiance += branch.throughput * material.emission / (index * index);
-                Leave(head, gathered, found, branch, line);
-                branch.throughput *= MirroredShare(material, found, arrival, wi, normal);
+                mat2 sides = mat2(0.0);
+                if (TEXTURES && FOOTPRINTS) {
+                    mat3x2 corners = CoordinatesOf(VerticesOf(found));
+                    sides = mat2(corners[1] - corners[0], corners[2] - corners[0]) * WeightDifferentials(arrival, before.position);
+                }
+                Leave(head, gathered, found, branch, line, sides);
+                branch.throughput *= MirroredShare(material, arrival, sides, wi, normal);
                 if (Largest(branch.throughput) > 0.0) {
                     vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
+                    Differentials reflected = before;
+                    if (FOOTPRINTS) reflected = Reflected(before, direction, normal, normals);
                     goesOn = branch.depth < frame.maxDepth && Largest(branch.throughput) > cutoff;
-                    if (goesOn) branch = Child(branch, arrival, wr, 1.0, branch.at);
-                    else Discard(gathered, outlook, branch.throughput, wr);
+                    if (goesOn) branch = Child(branch, arrival, wr, reflected, 1.0, branch.at);
+                    else Discard(gathered, outlook, branch.throughput, wr, reflected);
                 }
             } else {
                 if (passes) {
@@ -229,20 +252,26 @@ void main()
                     goesOn = ++passed <= MOST_PASSED;
                 }
                 if (passes ? !goesOn : branch.depth >= frame.maxDepth) {
-                    Discard(gathered, outlook, branch.throughput, direction);
+                    Discard(gathered, outlook, branch.throughput, direction, before);
                 } else if (!passes) {
                     ++interfaces;
                     passed = 0;
                     vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
                     vec3 wt = direction;
                     if (!isPane && !refraction.crossed.total) wt = DirectionAbove(normalize(refraction.wt), -faceNormal);
+                    Differentials reflected = before;
+                    Differentials refracted = before;
+                    if (FOOTPRINTS) {
+                        reflected = Reflected(before, direction, normal, normals);
+                        if (!isPane) refracted = Refracted(before, direction, normal, normals, wt, etaI / etaT);
+                    }
                     if (!REFLECTION) reflectance = 0.0;
                     if (!TRANSMISSION) transmittance = 0.0;
                     float whole = Largest(branch.throughput);
                     if (!INTERIOR) {
                         // The environment is all that lies beyond.
-                        LookTowards(outlook, branch.throughput * reflectance, wr);
-                        LookTowards(outlook, branch.throughput * transmittance, wt);
+                        LookTowards(outlook, branch.throughput * reflectance, wr, reflected.direction);
+                        LookTowards(outlook, branch.throughput * transmittance, wt, refracted.direction);
                     } else {
                         bool reflects = whole * reflectance > cutoff;
                         bool transmits = whole * transmittance > cutoff;
@@ -252,30 +281,35 @@ void main()
                         }
                         if (!reflects && reflectance > 0.0) {
                             gathered.faint += whole * reflectance;
-                            Discard(gathered, outlook, branch.throughput * reflectance, wr);
+                            Discard(gathered, outlook, branch.throughput * reflectance, wr, reflected);
                         }
                         if (!transmits && transmittance > 0.0) {
                             gathered.faint += whole * transmittance;
-                            Discard(gathered, outlook, branch.throughput * transmittance, wt);
+                            Discard(gathered, outlook, branch.throughput * transmittance, wt, refracted);
                         }
                         bool goesReflected = reflects && (reflectedFirst || !transmits);
                         if (reflects && transmits) {
-                            if (goesReflected) waiting[top] = Child(branch, arrival, wt, transmittance, boundary.beyond);
-                            else waiting[top] = Child(branch, arrival, wr, reflectance, boundary.before);
+                            if (goesReflected) waiting[top] = Child(branch, arrival, wt, refracted, transmittance, boundary.beyond);
+                            else waiting[top] = Child(branch, arrival, wr, reflected, reflectance, boundary.before);
                             ++top;
                         }
                         goesOn = reflects || transmits;
-                        if (goesReflected) branch = Child(branch, arrival, wr, reflectance, boundary.before);
-                        else branch = Child(branch, arrival, wt, transmittance, boundary.beyond);
+                        if (goesReflected) branch = Child(branch, arrival, wr, reflected, reflectance, boundary.before);
+                        else branch = Child(branch, arrival, wt, refracted, transmittance, boundary.beyond);
                     }
                 }
             }
         }
 
         for (uint i = 0; i < outlook.count; ++i) {
-            gathered.radiance += outlook.throughput * SampleEnvironment(outlook.direction, 0.0);
-            outlook.throughput = outlook.otherThroughput;
-            outlook.direction = outlook.otherDirection;
+            Look look = outlook.next;
+            vec3 seen = vec3(0.0);
+            // What is faint may be blurred.
+            int longest = clamp(int(ceil(float(LONGEST_ROW) * Largest(look.throughput))), 1, LONGEST_ROW);
+            if (FOOTPRINTS) seen = SampleEnvironment(look.direction, look.sides, longest);
+            else seen = SampleEnvironment(look.direction, 0.0);
+            gathered.radiance += look.throughput * seen;
+            outlook.next = outlook.other;
         }
 
         if (goesOn) continue;

@@ -23,6 +23,8 @@ pub struct Plan {
     pub cutoff: f64,
     /// Throughput that a pixel may lose so; infinite: any.
     pub tolerance: f64,
+    /// Whether environment and textures are averaged over a sample's share of its pixel, where rays are traced.
+    pub footprints: bool,
     /// How rays are traced, where the user has a wish.
     pub trace: Option<Trace>,
     /// Seed of everything random.
@@ -151,6 +153,7 @@ impl Plan {
             max_depth,
             cutoff: args.tolerance.map_or(CUTOFF, |tolerance| tolerance / 4.0),
             tolerance: args.tolerance.unwrap_or(f64::INFINITY),
+            footprints: model.traces(),
             trace: args.trace,
             seed: args.seed.unwrap_or(0),
             effects: share(true),

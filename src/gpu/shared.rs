@@ -131,5 +131,7 @@ pub struct SamplePush {
     pub sample_index: u32,
     pub first_row: u32,
     pub wavelengths: u32,
+    pub footprint: f32,
+    pub padding: [u32; 3],
     pub spectrum: [[f32; 4]; 4],
 }

@@ -2,11 +2,13 @@
 //! out flow pixels.
 
 mod exr;
+mod levels;
 mod output;
 mod png;
 mod read;
 
 pub use self::exr::encode as encode_exr;
+pub(crate) use levels::halved;
 pub use output::{ImageFormat, OutputFile};
 pub use png::encode as encode_png;
 pub use read::{KNOWN_FORMATS, LARGEST_SIDE, Stored, decode, decode_stored};

@@ -174,7 +174,7 @@ impl ModelPass {
     fn lit(&self, push: SamplePush, budget: Budget) -> SamplePush {
         match self {
             Self::Raster(_) => push,
-            Self::Tree(_) => sampling::spectrum(push, budget),
+            Self::Tree(_) => sampling::footprint(sampling::spectrum(push, budget), budget),
         }
     }
 }

@@ -13,6 +13,7 @@ use crate::gpu::{
     AccelerationStructure, Bind, BindGroup, Commands, Format, Frame, Gpu, GpuError, Image, ImageDesc, LightRecord,
     MaterialRecord, Result, Specialization, Use,
 };
+use crate::image;
 use crate::optics::compensation::AlbedoTable;
 use crate::optics::medium::absorption;
 use crate::optics::rough::RoughInterface;
@@ -24,6 +25,9 @@ use crate::scene::{
 
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
+
+/// The id of `FOOTPRINTS` in `shaders/footprint.glsl`.
+const FOOTPRINTS: u32 = 65;
 
 /// Buffers and images that every pass sees, as one group.
 pub(super) struct Resources {
@@ -61,7 +65,7 @@ impl Resources {
         let (materials, albedos) = materials(scene, plan, &view);
         let lights = lights(scene, &view);
         let single = Panorama::new(1, 1, vec![[1.0; 3]]);
-        let (panorama, specialization) = match &scene.environment.light {
+        let (panorama, is_image) = match &scene.environment.light {
             Surroundings::Image(panorama) => (panorama, true),
             Surroundings::Color(_) => (&single, false),
         };
@@ -120,11 +124,14 @@ impl Resources {
             traced.push(buffer(commands.upload_buffer("texture coordinates", &geometry.uvs)?));
             traced.push(buffer(commands.upload_buffer("texels", &texels)?));
         }
+        let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
         Ok(Self {
             group: BindGroup::new(commands.gpu(), "scene", bindings)?,
             traced,
             draws: geometry.draws,
-            specialization: Specialization::effects(plan.effects).with(ENVIRONMENT_IMAGE, specialization),
+            specialization: Specialization::effects(plan.effects)
+                .with(ENVIRONMENT_IMAGE, is_image)
+                .with(FOOTPRINTS, footprints),
             metres_per_unit: 1.0 / view.units_per_metre,
             opaque: trace.is_some() && plan.effects.contains(Effect::Opaque),
             acceleration: trace.map(|_| acceleration),
@@ -201,30 +208,37 @@ fn opaque_record(opaque: &Opaque) -> MaterialRecord {
     }
 }
 
-/// All textures in one buffer: where each starts, its width and its height, then the texels as half floats, linear.
+/// All textures in one buffer: where each starts, its width and its height, then the texels of each, linear as half floats, and
+/// of its halves.
 fn texels(textures: &[Texture]) -> Vec<u32> {
     let mut words = vec![0; 3 * textures.len()];
     for (number, texture) in textures.iter().enumerate() {
-        let header = [words.len() as u32, texture.width, texture.height];
+        let (mut width, mut height) = (texture.width, texture.height);
+        let header = [words.len() as u32, width, height];
         words[3 * number..][..3].copy_from_slice(&header);
-        match &texture.texels {
-            Texels::Srgb(texels) => words.extend(texels.iter().flat_map(|&texel| pack_texel(texel.map(decode_srgb)))),
-            Texels::Linear(texels) => words.extend(texels.iter().flat_map(|&texel| pack_texel(texel))),
+        let mut texels: Vec<[f32; 3]> = match &texture.texels {
+            Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| [r, g, b].map(decode_srgb)).collect(),
+            Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| [r, g, b].map(f16::to_f32)).collect(),
+        };
+        words.extend(texels.iter().copied().flat_map(pack_texel));
+        while width.max(height) > 1 {
+            (width, height, texels) = image::halved(&texels, width, height, |edge| edge);
+            words.extend(texels.iter().copied().flat_map(pack_texel));
         }
     }
     words
 }
 
-fn pack_texel([r, g, b, a]: [f16; 4]) -> [u32; 2] {
-    let pair = |low: f16, high: f16| u32::from(low.to_bits()) | u32::from(high.to_bits()) << 16;
-    [pair(r, g), pair(b, a)]
+fn pack_texel(texel: [f32; 3]) -> [u32; 2] {
+    let [r, g, b] = texel.map(|value| u32::from(f16::from_f32(value).to_bits()));
+    [r | g << 16, b]
 }
 
 /// From 8 bits as sRGB to linear: IEC 61966-2-1.
-fn decode_srgb(encoded: u8) -> f16 {
+fn decode_srgb(encoded: u8) -> f32 {
     let encoded = f64::from(encoded) / 255.0;
     let linear = if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
-    f16::from_f64(linear)
+    linear as f32
 }
 
 /// The material of each body by its rank, which counts from 1.
@@ -325,11 +339,13 @@ fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) ->
     commands.upload_image(&desc, &pack(&texels, half))
 }
 
-/// Levels of the panorama that rough surfaces see averages of; 1 where nothing is rough, or where they would not fit.
+/// Levels of the panorama that rough surfaces and wide look-ups see averages of; 1 where there are none, or where the levels would
+/// not fit.
 fn levels(gpu: &Gpu, panorama: &Panorama, scene: &Scene, plan: &Plan) -> u32 {
     let fits = panorama.height + panorama.height / 2 <= gpu.max_image_side();
     let opaque = plan.effects.contains(Effect::Opaque);
-    let needed = opaque || plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);
+    let needed =
+        plan.footprints || opaque || plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);
     if needed && fits { panorama.width.min(panorama.height).ilog2() + 1 } else { 1 }
 }
 

@@ -45,6 +45,16 @@ pub(super) fn spectrum(push: SamplePush, budget: Budget) -> SamplePush {
     SamplePush { wavelengths: WAVELENGTHS as u32, spectrum, ..push }
 }
 
+/// `push` with how wide its sample's share of the pixel is: the shares of all samples have the pixel's area, and where their number is
+/// not known those of a sample and the ones before it.
+pub(super) fn footprint(push: SamplePush, budget: Budget) -> SamplePush {
+    let count = match budget {
+        Budget::Samples(count) => count,
+        Budget::Seconds { .. } => push.sample_index + 1,
+    };
+    SamplePush { footprint: f64::from(count).sqrt().recip() as f32, ..push }
+}
+
 fn shift(seed: u64) -> DVec2 {
     if seed == 0 {
         return DVec2::ZERO;

@@ -103,42 +103,11 @@ impl Panorama {
     /// that they cover.
     #[must_use]
     pub fn halved(&self) -> Self {
-        let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
-        let columns = shares(self.width, width, |edge| edge);
         // A row between v and v + dv covers cos(pi v) - cos(pi (v + dv)).
-        let rows = shares(self.height, height, |edge| -(edge * std::f64::consts::PI).cos());
-        let mean = |row: &[(u32, f64)], column: &[(u32, f64)]| {
-            let mut sum = [0.0; 3];
-            for &(y, across) in row {
-                for &(x, along) in column {
-                    let texel = self.texels[(y * self.width + x) as usize];
-                    (0..3).for_each(|i| sum[i] += across * along * f64::from(texel[i]));
-                }
-            }
-            sum.map(|value| value as f32)
-        };
-        let texels = rows.iter().flat_map(|row| columns.iter().map(move |column| mean(row, column))).collect();
+        let (width, height, texels) =
+            image::halved(&self.texels, self.width, self.height, |edge| -(edge * std::f64::consts::PI).cos());
         Self { width, height, texels, repaired: Repairs::default() }
     }
-}
-
-/// For each of `to` intervals of equal length the intervals of `from` that it overlaps, each with its share of it; `measure` says how
-/// much lies before a point from 0 to 1.
-fn shares(from: u32, to: u32, measure: impl Fn(f64) -> f64) -> Vec<Vec<(u32, f64)>> {
-    let (many, few) = (f64::from(from), f64::from(to));
-    (0..to)
-        .map(|i| {
-            let (start, end) = (f64::from(i) / few, f64::from(i + 1) / few);
-            let whole = measure(end) - measure(start);
-            let last = ((end * many).ceil() as u32).min(from);
-            ((start * many) as u32..last)
-                .map(|j| {
-                    let (low, high) = ((f64::from(j) / many).max(start), (f64::from(j + 1) / many).min(end));
-                    (j, (measure(high) - measure(low)) / whole)
-                })
-                .collect()
-        })
-        .collect()
 }
 
 #[cfg(test)]

@@ -15,15 +15,26 @@ use crate::common::Validated;
 #[derive(Clone, Copy, Debug)]
 pub struct Shot {
     pub size: Size,
+    pub samples: u32,
     pub depth: u32,
     pub cutoff: f64,
     pub effects: &'static str,
     pub trace: Option<Trace>,
+    /// Whether look-ups are as wide as the pixel.
+    pub footprints: bool,
 }
 
 impl Default for Shot {
     fn default() -> Self {
-        Self { size: Size { width: 96, height: 72 }, depth: 32, cutoff: 1e-5, effects: "auto", trace: None }
+        Self {
+            size: Size { width: 96, height: 72 },
+            samples: 1,
+            depth: 32,
+            cutoff: 1e-5,
+            effects: "auto",
+            trace: None,
+            footprints: false,
+        }
     }
 }
 
@@ -61,8 +72,15 @@ impl Device {
     /// The picture of a shot. No value of it may be anything but finite and not negative.
     pub fn picture(&self, scene: &Scene, shot: Shot) -> Picture {
         let effects = Some(shot.effects.parse().expect("a selection"));
-        let args = RenderArgs { max_depth: Some(shot.depth), trace: shot.trace, effects, ..sized(shot.size) };
-        self.planned(scene, &Plan { cutoff: shot.cutoff, ..Plan::new(scene, &args).expect("a plan") })
+        let args = RenderArgs {
+            samples: Some(shot.samples),
+            max_depth: Some(shot.depth),
+            trace: shot.trace,
+            effects,
+            ..sized(shot.size)
+        };
+        let plan = Plan::new(scene, &args).expect("a plan");
+        self.planned(scene, &Plan { cutoff: shot.cutoff, footprints: shot.footprints, ..plan })
     }
 
     /// The picture with a tolerance, and whatever depth comes with that.

@@ -29,7 +29,9 @@ fn bodies_of_index_one_are_the_environment_bit_by_bit() {
     {
         let glass = in_the_city(of_index_one(glass));
         let empty = Scene { objects: Vec::new(), ..glass.clone() };
-        let [found, expected] = [glass, empty].map(|scene| device.picture(&scene, Shot::default()));
+        // As a render does it: with look-ups as wide as the pixel.
+        let shot = Shot { footprints: true, ..Shot::default() };
+        let [found, expected] = [glass, empty].map(|scene| device.picture(&scene, shot));
         let differing = found.differing(&expected, 0.0);
         assert_eq!(differing, 0, "{name}: {differing} pixels, the worst by {}", found.largest_difference(&expected));
         assert!(found.discarded.iter().chain(&found.interfaces).all(|&count| count == 0.0), "{name}");

@@ -8,6 +8,7 @@ mod closest;
 mod convergence;
 mod device;
 mod extremes;
+mod footprints;
 mod furnace;
 mod limits;
 mod media;
