@@ -79,5 +79,6 @@ void main()
     Put(sampleIndex);
     Put(firstRow);
     Put(wavelengths);
+    Put(footprint);
     for (int i = 0; i < 4; ++i) Put(spectrum[i]);
 }

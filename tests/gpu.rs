@@ -121,6 +121,8 @@ impl Records {
                 sample_index: n.next() as u32,
                 first_row: n.next() as u32,
                 wavelengths: n.next() as u32,
+                footprint: n.next(),
+                padding: [0; 3],
                 spectrum: std::array::from_fn(|_| std::array::from_fn(|_| n.next())),
             },
         };

@@ -184,10 +184,11 @@ fn cut_off(plan: &Plan, stats: &Stats) -> Option<String> {
     let promised = plan.options.tolerance.map_or(SEEN, |tolerance| tolerance as f32);
     (most > promised).then(|| {
         let mean = stats.discarded.map_or(0.0, |discarded| discarded.mean);
-        format!(
-            "note: cut off was up to {most:.4} of a pixel's light, {mean:.4} in the mean; --max-depth above {depth} \
-             follows more of it"
-        )
+        let advice = match plan.options.tolerance {
+            Some(_) => format!("--max-depth above {depth} may follow more of it"),
+            None => format!("--tolerance or a --max-depth above {depth} follow more of it"),
+        };
+        format!("note: cut off was up to {most:.4} of a pixel's light, {mean:.4} in the mean; {advice}")
     })
 }
 
