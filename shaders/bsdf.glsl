@@ -95,9 +95,6 @@ vec3 ComputeDirect(vec3 reflection, SurfaceData data, vec3 viewDir)
 
 // ---- rough surfaces: Walter et al. 2007 in the place of the smooth interface ---------------------------------------------------
 
-// Up to the original's default a surface is smooth: its highlights are narrower than a pixel, and nothing else differs.
-const float SMOOTH_ROUGHNESS = 0.01;
-
 bool IsRough(SurfaceData data)
 {
     return ROUGHNESS && data.roughness > SMOOTH_ROUGHNESS && data.refractionIndex != 1.0;

@@ -3,6 +3,7 @@
 #ifndef COMPENSATION_GLSL
 #define COMPENSATION_GLSL
 
+#include "constants.glsl"
 #include "shared.glsl"
 
 // Nodes of a table, at cosines (i / (ALBEDO_NODES - 1))^3.
@@ -21,6 +22,24 @@ float RoughAlbedo(uint table, float cosThetaI)
     uint low = min(uint(pow(cosine, 1.0 / 3.0) * float(ALBEDO_NODES - 1)), ALBEDO_NODES - 2);
     float share = (cosine - AlbedoNode(low)) / (AlbedoNode(low + 1) - AlbedoNode(low));
     return mix(albedos[table + low], albedos[table + low + 1], share);
+}
+
+// The table of an interface between two indices among the tables of a material: how many there are, then of each the indices and its
+// first node. The one that is closest, since an index that changes with the wavelength has none of its own.
+uint RoughTable(uint tables, float etaI, float etaT)
+{
+    uint count = uint(albedos[tables]);
+    uint table = 0;
+    float nearest = LARGEST_FLOAT;
+    for (uint i = 0; i < count; ++i) {
+        uint entry = tables + 1 + 3 * i;
+        float distance = abs(albedos[entry] - etaI) + abs(albedos[entry + 1] - etaT);
+        if (distance < nearest) {
+            nearest = distance;
+            table = uint(albedos[entry + 2]);
+        }
+    }
+    return table;
 }
 
 // The factor that gives back what is lost. Along a very rough surface close to index 1 nearly everything is, and a number above 0 is

@@ -6,4 +6,6 @@ const float PI = 3.14159265358979;
 const float LARGEST_FLOAT = 3.4028235e38;
 const float LAST_BELOW_ONE = 0.99999994; // 1 - 2^-24
 
+float Largest(vec3 v) { return max(max(v.x, v.y), v.z); }
+
 #endif

@@ -12,6 +12,7 @@
 #include "opaque.glsl"
 #include "pixel.glsl"
 #include "records.glsl"
+#include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

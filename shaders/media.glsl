@@ -18,6 +18,9 @@ struct Bodies {
 
 const int MOST_BODIES = 8;
 
+// Boundaries that scatter nothing, as those between equal indices, that a ray passes in a row.
+const uint MOST_PASSED = 4096;
+
 layout(std430, set = 0, binding = 11) readonly buffer RankBuffer { uint rankedMaterials[]; };
 
 uint RankAt(Bodies bodies, int i)

@@ -63,6 +63,30 @@ vec3 EvaluateOpaque(OpaqueSurface surface, vec3 wi, vec3 wo)
     return value;
 }
 
+// The share of directions that are chosen for what facets mirror.
+float SpecularChance(OpaqueSurface surface, vec3 wi)
+{
+    if (!IsSpecular(surface)) return 0.0;
+    vec3 mirrored = FacetReflectance(surface, wi.z);
+    float mirror = mirrored.x + mirrored.y + mirrored.z;
+    float below = BelowFacets(surface, wi.z) * (surface.diffuse.x + surface.diffuse.y + surface.diffuse.z);
+    return mirror / max(mirror + below, 1e-30);
+}
+
+// The density of SampleOpaque choosing wo, per steradian, but for directions that a mirror has no choice about.
+float OpaquePdf(OpaqueSurface surface, vec3 wi, vec3 wo)
+{
+    if (wi.z <= 0.0 || wo.z <= 0.0) return 0.0;
+    float chance = SpecularChance(surface, wi);
+    float pdf = (1.0 - chance) * wo.z / PI;
+    if (chance > 0.0 && !IsMirror(surface)) {
+        vec3 wm = normalize(wi + wo);
+        pdf += chance * DistributionGGX(wm.z, dot(wm.xy, wm.xy), surface.alpha)
+            * MaskingOverCosineGGX(wi.z, dot(wi.xy, wi.xy), surface.alpha) / 2.0;
+    }
+    return pdf;
+}
+
 // A direction to the light, what its radiance is worth, and the density of such directions.
 struct LightSample {
     vec3 wo;

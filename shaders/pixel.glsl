@@ -7,11 +7,6 @@
 layout(set = 0, binding = 14, rgba32f) uniform image2D mean;    // radiance, and throughput cut off
 layout(set = 0, binding = 15, rgba32f) uniform image2D counts;  // interfaces, rays
 
-// Boundaries that scatter nothing, as those between equal indices, that a ray passes in a row.
-const uint MOST_PASSED = 4096;
-
-float Largest(vec3 v) { return max(max(v.x, v.y), v.z); }
-
 struct Sample {
     vec4 value;       // radiance, and throughput cut off
     uint interfaces;

@@ -67,6 +67,7 @@ void main()
     Put(materials[1].kind);
     Put(materials[1].albedoTable);
     Put(materials[1].texture);
+    Put(materials[1].albedoTables);
     Put(lights[1].position);
     Put(lights[1].intensity);
     Put(positions[1]);
@@ -80,5 +81,6 @@ void main()
     Put(firstRow);
     Put(wavelengths);
     Put(footprint);
+    Put(samplesInBatch);
     for (int i = 0; i < 4; ++i) Put(spectrum[i]);
 }

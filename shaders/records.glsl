@@ -2,9 +2,7 @@
 #ifndef RECORDS_GLSL
 #define RECORDS_GLSL
 
-#include "arrival.glsl"
-#include "effects.glsl"
-#include "texture.glsl"
+#include "shared.glsl"
 
 struct Record {
     vec3 origin;      // of the ray that found it
@@ -26,14 +24,5 @@ layout(std430, set = 0, binding = 17) buffer RecordBuffer {
     uint recordPadding;
     Record records[];
 };
-
-// The colour of an opaque surface at a point of the triangle that was found; `sides` of what the pixel sees of it in the texture's
-// coordinates.
-vec3 BaseColor(Material material, Found found, vec3 weights, mat2 sides)
-{
-    if (!TEXTURES || material.texture == 0) return material.baseColor;
-    uvec3 vertices = VerticesOf(found);
-    return SampleTexture(material.texture, CoordinatesOf(vertices) * weights, sides);
-}
 
 #endif

@@ -63,7 +63,7 @@ struct Material {
     uint kind;
     uint albedoTable;          // its first node in the tables of compensation.glsl
     uint texture;              // from 1; 0: none
-    uint padding;
+    uint albedoTables;         // of every pair of indices that meet at it; 0: none
 };
 
 struct Light {
@@ -89,7 +89,8 @@ layout(push_constant) uniform Push {
     uint firstRow;             // of the rows that are traced
     uint wavelengths;          // that a sample takes
     float footprint;           // how wide its share of a pixel is, 0 to 1
-    uint pushPadding[3];
+    uint samplesInBatch;       // that a pixel takes at once
+    uint pushPadding[2];
     vec4 spectrum[4];          // of each its colour, and nanometres
 };
 

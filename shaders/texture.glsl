@@ -2,6 +2,8 @@
 #ifndef TEXTURE_GLSL
 #define TEXTURE_GLSL
 
+#include "arrival.glsl"
+#include "effects.glsl"
 #include "filter.glsl"
 #include "shared.glsl"
 
@@ -77,6 +79,15 @@ vec3 SampleTexture(uint number, vec2 uv, mat2 sides)
         sum += color;
     }
     return sum / float(row.count);
+}
+
+// The colour of an opaque surface at a point of the triangle that was found; `sides` of what the pixel sees of it in the texture's
+// coordinates.
+vec3 BaseColor(Material material, Found found, vec3 weights, mat2 sides)
+{
+    if (!TEXTURES || material.texture == 0) return material.baseColor;
+    uvec3 vertices = VerticesOf(found);
+    return SampleTexture(material.texture, CoordinatesOf(vertices) * weights, sides);
 }
 
 #endif

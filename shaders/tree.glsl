@@ -13,6 +13,7 @@
 #include "trace.glsl"
 #include "arrival.glsl"
 #include "camera.glsl"
+#include "constants.glsl"
 #include "effects.glsl"
 #include "environment.glsl"
 #include "footprint.glsl"
@@ -21,6 +22,7 @@
 #include "opaque.glsl"
 #include "pixel.glsl"
 #include "records.glsl"
+#include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

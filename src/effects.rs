@@ -55,21 +55,22 @@ struct Row {
 /// THE table. Detection is conservative: an effect that might show is called for.
 const TABLE: [Row; 13] = {
     use Effect::*;
-    use Model::{Single, Tree};
-    const TRACED: &[Model] = &[Tree];
-    const BOTH: &[Model] = &[Single, Tree];
+    use Model::{Path, Single, Tree};
+    const TRACED: &[Model] = &[Tree, Path];
+    const ALL: &[Model] = &[Single, Tree, Path];
+    const ROUGH: &[Model] = &[Single, Path];
     const fn row(effect: Effect, name: &'static str, models: &'static [Model], called_for: fn(&Scene) -> bool) -> Row {
         let needs = if matches!(effect, EnergyCompensation) { Some(Roughness) } else { None };
         Row { effect, name, models, needs, called_for }
     }
     [
-        row(Reflection, "reflection", BOTH, |s| any_dielectric(s, |_| true)),
-        row(Transmission, "transmission", BOTH, |s| any_dielectric(s, |_| true)),
+        row(Reflection, "reflection", ALL, |s| any_dielectric(s, |_| true)),
+        row(Transmission, "transmission", ALL, |s| any_dielectric(s, |_| true)),
         row(Interior, "interior", TRACED, |s| any_dielectric(s, |_| true)),
-        row(DirectLight, "direct-light", BOTH, has_light),
+        row(DirectLight, "direct-light", ALL, has_light),
         row(Shadows, "shadows", TRACED, has_light),
-        row(Roughness, "roughness", &[Single], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
-        row(EnergyCompensation, "energy-compensation", &[Single], |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
+        row(Roughness, "roughness", ROUGH, |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
+        row(EnergyCompensation, "energy-compensation", ROUGH, |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
         row(Absorption, "absorption", TRACED, |s| any_dielectric(s, absorbs)),
         row(Dispersion, "dispersion", TRACED, |s| any_dielectric(s, disperses)),
         row(Nesting, "nesting", TRACED, nests),

@@ -21,7 +21,8 @@ pub struct Plan {
     pub max_depth: Option<u32>,
     /// Throughput below which a branch is cut off.
     pub cutoff: f64,
-    /// Throughput that a pixel may lose so; infinite: any.
+    /// What a user tolerates: of `tree` the throughput that a pixel may lose so, of `path` the mean relative error of the picture;
+    /// infinite: anything.
     pub tolerance: f64,
     /// Whether environment and textures are averaged over a sample's share of its pixel, where rays are traced.
     pub footprints: bool,
@@ -75,6 +76,10 @@ impl Budget {
 /// Samples that a time budget ends with at the latest.
 const MOST_SAMPLES: u32 = 1 << 20;
 
+/// Samples per pixel, where the user has no wish.
+const SAMPLES: u32 = 16;
+const SAMPLES_OF_PATH: u32 = 256;
+
 /// Visible normals that all samples of a pixel should take of a rough surface.
 const NORMALS: u32 = 256;
 
@@ -113,10 +118,11 @@ impl Plan {
         let has: &[Aov] = match model {
             Model::Single => &[Aov::Normal, Aov::Depth, Aov::Object],
             Model::Tree => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded],
-            Model::Double | Model::Path => {
+            Model::Path => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Stderr],
+            Model::Double => {
                 let name = model.name();
                 return Err(Error::Usage(format!(
-                    "--model {name}: this version has no such model yet; it has: single, tree"
+                    "--model {name}: this version has no such model yet; it has: single, tree, path"
                 )));
             }
         };
@@ -134,11 +140,13 @@ impl Plan {
             return Err(Error::Usage(format!("--aov {name}: model {model} does not have it; it has: {has}")));
         }
         let size = args.size.unwrap_or(Size { width: 1024, height: 768 });
+        let most = args.samples.unwrap_or(MOST_SAMPLES);
         let budget = match args.time_budget {
-            Some(seconds) => Budget::Seconds { seconds, most: args.samples.unwrap_or(MOST_SAMPLES) },
-            None => Budget::Samples(args.samples.unwrap_or(16)),
+            Some(seconds) => Budget::Seconds { seconds, most },
+            None if model == Model::Path && args.tolerance.is_some() => Budget::Seconds { seconds: f64::INFINITY, most },
+            None => Budget::Samples(args.samples.unwrap_or(if model == Model::Path { SAMPLES_OF_PATH } else { SAMPLES })),
         };
-        let depth = if args.tolerance.is_some() { DEPTH_OF_TOLERANCE } else { DEPTH };
+        let depth = if args.tolerance.is_some() && model == Model::Tree { DEPTH_OF_TOLERANCE } else { DEPTH };
         let max_depth = (model != Model::Single).then(|| args.max_depth.unwrap_or(depth));
         let selection = args.effects.clone().unwrap_or_default();
         let selected = selection.resolve(scene);
@@ -153,7 +161,7 @@ impl Plan {
             max_depth,
             cutoff: args.tolerance.map_or(CUTOFF, |tolerance| tolerance / 4.0),
             tolerance: args.tolerance.unwrap_or(f64::INFINITY),
-            footprints: model.traces(),
+            footprints: model == Model::Tree,
             trace: args.trace,
             seed: args.seed.unwrap_or(0),
             effects: share(true),

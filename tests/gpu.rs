@@ -107,7 +107,7 @@ impl Records {
                 kind: n.next() as u32,
                 albedo_table: n.next() as u32,
                 texture: n.next() as u32,
-                padding: 0,
+                albedo_tables: n.next() as u32,
             },
             light: LightRecord { position: n.vector(), intensity: n.vector(), ..LightRecord::zeroed() },
             position: n.next(),
@@ -122,7 +122,8 @@ impl Records {
                 first_row: n.next() as u32,
                 wavelengths: n.next() as u32,
                 footprint: n.next(),
-                padding: [0; 3],
+                samples_in_batch: n.next() as u32,
+                padding: [0; 2],
                 spectrum: std::array::from_fn(|_| std::array::from_fn(|_| n.next())),
             },
         };

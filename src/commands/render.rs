@@ -222,15 +222,15 @@ fn channels(aov: Aov, rendered: &Rendered) -> Option<Vec<(&'static str, Vec<f32>
         let channel = |axis: usize| (names[axis], values.iter().map(|value| value[axis]).collect());
         (0..3).map(channel).collect()
     };
-    let (surfaces, tree) = (rendered.aovs.as_ref(), rendered.tree.as_ref());
+    let (surfaces, counts) = (rendered.aovs.as_ref(), rendered.counts.as_ref());
     match aov {
         Aov::Normal => surfaces.map(|aovs| three(["X", "Y", "Z"], &aovs.normal)),
         Aov::Depth => surfaces.map(|aovs| one("Z", &aovs.depth)),
         Aov::Albedo => surfaces.map(|aovs| three(["R", "G", "B"], &aovs.albedo)),
         Aov::Object => surfaces.map(|aovs| one("ID", &aovs.object)),
-        Aov::Interfaces => tree.map(|tree| one("N", &tree.interfaces)),
-        Aov::Discarded => tree.map(|tree| one("Y", &tree.discarded)),
-        Aov::Stderr => None,
+        Aov::Interfaces => counts.map(|counts| one("N", &counts.interfaces)),
+        Aov::Discarded => counts?.discarded.as_ref().map(|discarded| one("Y", discarded)),
+        Aov::Stderr => counts?.stderr.as_ref().map(|stderr| three(["R", "G", "B"], stderr)),
     }
 }
 

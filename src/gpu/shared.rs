@@ -97,7 +97,7 @@ pub struct MaterialRecord {
     pub kind: u32,
     pub albedo_table: u32,
     pub texture: u32,
-    pub padding: u32,
+    pub albedo_tables: u32,
 }
 
 impl MaterialRecord {
@@ -132,6 +132,7 @@ pub struct SamplePush {
     pub first_row: u32,
     pub wavelengths: u32,
     pub footprint: f32,
-    pub padding: [u32; 3],
+    pub samples_in_batch: u32,
+    pub padding: [u32; 2],
     pub spectrum: [[f32; 4]; 4],
 }

@@ -66,7 +66,7 @@ mod tests {
     fn shaders_have_the_same_nodes_and_the_same_threshold() {
         let nodes = include_str!("../../shaders/compensation.glsl");
         assert!(nodes.contains(&format!("const uint ALBEDO_NODES = {NODES};")));
-        let threshold = include_str!("../../shaders/bsdf.glsl");
+        let threshold = include_str!("../../shaders/rough.glsl");
         assert!(threshold.contains(&format!("const float SMOOTH_ROUGHNESS = {SMOOTH};")));
     }
 

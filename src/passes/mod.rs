@@ -6,13 +6,17 @@
 mod accumulate;
 mod aov;
 mod bvh;
+mod counts;
 mod display;
 mod environment;
 mod geometry;
+mod path;
 mod probe;
 mod resources;
 mod sampling;
 mod single;
+mod skylight;
+mod slices;
 mod tree;
 mod view;
 
@@ -31,14 +35,16 @@ use aov::AovPass;
 use display::Display;
 use environment::EnvironmentPass;
 use geometry::Draw;
+use path::{Path, PathTargets};
 use resources::Resources;
+use sampling::Round;
 use single::Single;
-use tree::{Pending, Tree};
+use tree::{Tree, TreeTargets};
 
 pub use aov::Aovs;
+pub use counts::Counts;
 pub use probe::{Hit, Leaks, Ray, TraceProbe};
 pub use sampling::pixel_offsets;
-pub use tree::TreeCounts;
 
 /// Radiance in flight, and means of it.
 const RADIANCE: Format = Format::Rgba32Float;
@@ -52,8 +58,8 @@ pub struct Rendered {
     pub display: Vec<[u8; 4]>,
     /// What lies at the centres of the pixels, if it was asked for.
     pub aovs: Option<Aovs>,
-    /// What the model `tree` counted.
-    pub tree: Option<TreeCounts>,
+    /// What a model that traces counted.
+    pub counts: Option<Counts>,
     /// How rays were traced, if any were.
     pub trace: Option<Trace>,
     /// Samples per pixel.
@@ -109,13 +115,13 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
     let targets = Targets::new(gpu, plan.size, &resources, plan.model)?;
     let mut times = Times::default();
     let mut samples = 0;
-    for offset in sampling::pixel_offsets(plan.budget, plan.seed) {
-        let push = view::sample_push(plan.size, offset, samples);
-        let push = passes.model.lit(push, plan.budget);
-        times.add(passes.sample(&mut commands, &resources, &targets, &resources.draws, push)?);
-        samples += 1;
+    for (rounds, round) in (1..).zip(sampling::rounds(plan)) {
+        times.add(passes.sample(&mut commands, &resources, &targets, &resources.draws, round.push)?);
+        samples += round.samples;
         progress(samples);
-        if is_spent(plan.budget, set_up, start.elapsed(), samples) {
+        if is_spent(plan.budget, set_up, start.elapsed(), rounds)
+            || is_precise(&mut commands, &targets, plan, rounds)?
+        {
             break;
         }
     }
@@ -124,10 +130,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
     times.add(time);
     let mean = commands.read_image(&targets.mean)?;
     let radiance = radiance(&mean)?;
-    let tree = match &targets.tree {
-        Some(tree) => Some(TreeCounts::new(&mean, &commands.read_image(&tree.counts)?, samples)),
-        None => None,
-    };
+    let counts = targets.counts(&mut commands, &mean, samples)?;
     let mut aovs = None;
     if let Some(pass) = &passes.aov {
         let (values, time) = pass.run(&mut commands, &resources, &resources.draws, plan.size)?;
@@ -138,7 +141,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
         radiance,
         display,
         aovs,
-        tree,
+        counts,
         trace,
         samples,
         passes: times.0,
@@ -159,8 +162,10 @@ struct Passes {
 enum ModelPass {
     /// Rasterised: what is covered, what is not, the mean of both.
     Raster(Box<Raster>),
-    /// Every pixel from the camera on.
+    /// Every pixel's tree from the camera on.
     Tree(Box<Tree>),
+    /// Every pixel's paths from the camera on.
+    Path(Box<Path>),
 }
 
 struct Raster {
@@ -169,24 +174,19 @@ struct Raster {
     accumulate: Accumulate,
 }
 
-impl ModelPass {
-    /// What a sample tells the shaders beyond its place in the pixel.
-    fn lit(&self, push: SamplePush, budget: Budget) -> SamplePush {
-        match self {
-            Self::Raster(_) => push,
-            Self::Tree(_) => sampling::footprint(sampling::spectrum(push, budget), budget),
-        }
-    }
-}
-
 impl Passes {
     /// Makes every pipeline and runs each once on a few pixels, so that no time of a pass holds its compilation.
     fn new(commands: &mut Commands, resources: &Resources, plan: &Plan, trace: Option<Trace>) -> Result<Self> {
         let gpu = commands.gpu().clone();
         let small = Size { width: 16, height: 16 };
         let targets = Targets::new(&gpu, small, resources, plan.model)?;
-        let model = match (&targets.tree, trace) {
-            (Some(tree), Some(trace)) => ModelPass::Tree(Box::new(Tree::new(commands, resources, &tree.group, trace)?)),
+        let model = match (&targets.model, trace) {
+            (ModelTargets::Tree(tree), Some(trace)) => {
+                ModelPass::Tree(Box::new(Tree::new(commands, resources, tree, trace)?))
+            }
+            (ModelTargets::Path(path), Some(trace)) => {
+                ModelPass::Path(Box::new(Path::new(&gpu, resources, path, trace)?))
+            }
             _ => ModelPass::Raster(Box::new(Raster {
                 single: Single::new(&gpu, resources)?,
                 environment: EnvironmentPass::new(&gpu, resources)?,
@@ -204,8 +204,10 @@ impl Passes {
         };
         let few: Vec<_> =
             resources.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect();
-        let push = passes.model.lit(SamplePush::default(), plan.budget);
-        passes.sample(commands, resources, &targets, &few, push)?;
+        if let Some(Round { push, .. }) = sampling::rounds(plan).next() {
+            let push = SamplePush { samples_in_batch: 1, ..push };
+            passes.sample(commands, resources, &targets, &few, push)?;
+        }
         passes.display.run(commands, &targets, plan)?;
         if let Some(aov) = &passes.aov {
             aov.run(commands, resources, &few, small)?;
@@ -221,13 +223,16 @@ impl Passes {
         draws: &[Draw],
         push: SamplePush,
     ) -> Result<Vec<PassTime>> {
-        match &mut self.model {
-            ModelPass::Raster(raster) => commands.run(|cmd| {
+        match (&mut self.model, &targets.model) {
+            (ModelPass::Tree(pass), ModelTargets::Tree(tree)) => pass.sample(commands, targets, tree, push),
+            (ModelPass::Path(pass), ModelTargets::Path(path)) => pass.batch(commands, targets, path, push),
+            (ModelPass::Raster(raster), _) => commands.run(|cmd| {
                 cmd.timed("single", |cmd| raster.single.record(cmd, resources, targets, draws, push));
                 cmd.timed("environment", |cmd| raster.environment.record(cmd, resources, targets, push));
                 cmd.timed("accumulate", |cmd| raster.accumulate.record(cmd, targets, push.sample_index));
             }),
-            ModelPass::Tree(tree) => tree.sample(commands, targets, push),
+            // A pass comes with its own targets.
+            (ModelPass::Tree(_) | ModelPass::Path(_), _) => Ok(Vec::new()),
         }
     }
 }
@@ -236,32 +241,17 @@ impl Passes {
 struct Targets {
     accumulation: BindGroup,
     display: BindGroup,
-    /// What `tree` reads and writes.
-    tree: Option<TreeTargets>,
+    model: ModelTargets,
     radiance: Arc<Image>,
     mean: Arc<Image>,
     depth: Image,
 }
 
-/// What the model `tree` reads and writes beside the mean.
-struct TreeTargets {
-    /// All of it, and the scene.
-    group: BindGroup,
-    counts: Arc<Image>,
-    pending: Pending,
-}
-
-impl TreeTargets {
-    fn new(gpu: &Gpu, resources: &Resources, mean: &Arc<Image>) -> Result<Self> {
-        let (width, height) = (mean.width(), mean.height());
-        let uses = &[Use::Storage, Use::CopySource];
-        let counts = Arc::new(Image::new(gpu, &ImageDesc { name: "counts", width, height, format: RADIANCE, uses })?);
-        let pending = Pending::new(gpu, resources.opaque)?;
-        let mut bindings = resources.traced.clone();
-        bindings.extend([Bind::Storage(mean.clone()), Bind::Storage(counts.clone())]);
-        bindings.extend(pending.bindings());
-        Ok(Self { group: BindGroup::new(gpu, "tree", bindings)?, counts, pending })
-    }
+/// What a model reads and writes beside the mean.
+enum ModelTargets {
+    Raster,
+    Tree(TreeTargets),
+    Path(PathTargets),
 }
 
 impl Targets {
@@ -271,17 +261,30 @@ impl Targets {
         let mean = Arc::new(image("mean", RADIANCE, &[Use::Storage, Use::Sampled, Use::CopySource])?);
         let depth = image("depth", Format::Depth32, &[Use::DepthTarget])?;
         let accumulation = vec![Bind::Sampled(radiance.clone()), Bind::Storage(mean.clone())];
-        let tree = match model {
-            Model::Tree => Some(TreeTargets::new(gpu, resources, &mean)?),
-            Model::Single | Model::Double | Model::Path => None,
+        let model = match model {
+            Model::Tree => ModelTargets::Tree(TreeTargets::new(gpu, resources, &mean)?),
+            Model::Path => ModelTargets::Path(PathTargets::new(gpu, resources, &mean)?),
+            Model::Single | Model::Double => ModelTargets::Raster,
         };
         Ok(Self {
             accumulation: BindGroup::new(gpu, "accumulation", accumulation)?,
             display: BindGroup::new(gpu, "display", vec![Bind::Sampled(mean.clone())])?,
-            tree,
+            model,
             radiance,
             mean,
             depth,
+        })
+    }
+
+    /// What the model counted; `mean` are the bytes of that image.
+    fn counts(&self, commands: &mut Commands, mean: &[u8], samples: u32) -> Result<Option<Counts>> {
+        Ok(match &self.model {
+            ModelTargets::Raster => None,
+            ModelTargets::Tree(tree) => Some(Counts::of_trees(mean, &commands.read_image(&tree.counts)?, samples)),
+            ModelTargets::Path(path) => {
+                let counts = commands.read_image(&path.counts)?;
+                Some(Counts::of_paths(&counts, &commands.read_image(&path.spread)?, samples))
+            }
         })
     }
 }
@@ -301,13 +304,29 @@ impl Times {
     }
 }
 
-/// Whether another sample like those before would end after the time.
-fn is_spent(budget: Budget, set_up: Duration, elapsed: Duration, samples: u32) -> bool {
+/// Rounds after which errors are estimated for the first time, and how many times as many make up the next.
+const FIRST_ESTIMATE: u32 = 32;
+const NEXT_ESTIMATE: f64 = 1.2;
+
+/// Whether the error of the picture is as small as was asked for, in models that estimate it.
+fn is_precise(commands: &mut Commands, targets: &Targets, plan: &Plan, rounds: u32) -> Result<bool> {
+    let ModelTargets::Path(path) = &targets.model else { return Ok(false) };
+    // Rounds grow by a constant factor between estimates: those cost little then.
+    let step = |rounds: u32| (f64::from(rounds) / f64::from(FIRST_ESTIMATE)).log(NEXT_ESTIMATE).floor();
+    if plan.tolerance == f64::INFINITY || rounds < FIRST_ESTIMATE || step(rounds) == step(rounds - 1) {
+        return Ok(false);
+    }
+    let (mean, spread) = (commands.read_image(&targets.mean)?, commands.read_image(&path.spread)?);
+    Ok(counts::relative_error(&mean, &spread) < plan.tolerance)
+}
+
+/// Whether another round like those before would end after the time.
+fn is_spent(budget: Budget, set_up: Duration, elapsed: Duration, rounds: u32) -> bool {
     match budget {
         Budget::Samples(_) => false,
         Budget::Seconds { seconds, .. } => {
             let sampling = elapsed.saturating_sub(set_up);
-            (elapsed + sampling / samples).as_secs_f64() > seconds
+            (elapsed + sampling / rounds).as_secs_f64() > seconds
         }
     }
 }

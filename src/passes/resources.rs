@@ -7,6 +7,7 @@ use glam::{DVec3, Vec3};
 use half::f16;
 
 use super::geometry::{Draw, Geometry};
+use super::skylight;
 use super::view::View;
 use crate::effects::{Effect, SMOOTH};
 use crate::gpu::{
@@ -17,7 +18,7 @@ use crate::image;
 use crate::optics::compensation::AlbedoTable;
 use crate::optics::medium::absorption;
 use crate::optics::rough::RoughInterface;
-use crate::options::Trace;
+use crate::options::{Model, Trace};
 use crate::plan::{Budget, Plan};
 use crate::scene::{
     Dielectric, Dispersion, Material, Opaque, Panorama, Scene, Sellmeier, Surface, Surroundings, Texels, Texture,
@@ -34,6 +35,8 @@ pub(super) struct Resources {
     pub(super) group: BindGroup,
     /// The same with what only traced models read.
     pub(super) traced: Vec<Bind>,
+    /// The environment as a light, for `path`.
+    pub(super) sky: Option<Bind>,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
@@ -124,10 +127,18 @@ impl Resources {
             traced.push(buffer(commands.upload_buffer("texture coordinates", &geometry.uvs)?));
             traced.push(buffer(commands.upload_buffer("texels", &texels)?));
         }
+        let sky = match plan.model {
+            Model::Path => {
+                let table = if is_image { skylight::table(panorama) } else { vec![skylight::Cell::default()] };
+                Some(buffer(commands.upload_buffer("the environment as a light", &table)?))
+            }
+            _ => None,
+        };
         let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
         Ok(Self {
             group: BindGroup::new(commands.gpu(), "scene", bindings)?,
             traced,
+            sky,
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)
@@ -139,28 +150,72 @@ impl Resources {
     }
 }
 
+/// Tables of what single bounces between facets lose, each interface's once: `shaders/compensation.glsl`.
+struct Albedos {
+    /// Nothing stands at 0, which says that there is no table.
+    values: Vec<f32>,
+    tables: Vec<(RoughInterface, u32)>,
+}
+
+impl Albedos {
+    /// The first node of the table of `interface`.
+    fn table(&mut self, interface: RoughInterface) -> u32 {
+        if let Some(&(_, first)) = self.tables.iter().find(|(other, _)| *other == interface) {
+            return first;
+        }
+        let first = self.values.len() as u32;
+        self.values.extend(AlbedoTable::new(interface).nodes().iter().map(|&albedo| albedo as f32));
+        self.tables.push((interface, first));
+        first
+    }
+
+    /// Where the tables of all pairs are listed that `ior` makes with `others`, from either side.
+    fn pairs(&mut self, alpha: f64, ior: f64, others: &[f64]) -> u32 {
+        let mut list = Vec::new();
+        for &other in others.iter().filter(|&&other| other != ior) {
+            for (eta_i, eta_t) in [(other, ior), (ior, other)] {
+                let first = self.table(RoughInterface { alpha, eta_i, eta_t });
+                list.extend([eta_i as f32, eta_t as f32, first as f32]);
+            }
+        }
+        let start = self.values.len() as u32;
+        self.values.push((list.len() / 3) as f32);
+        self.values.extend(list);
+        start
+    }
+}
+
+/// The indices of all that a ray can be in.
+fn indices(scene: &Scene, plan: &Plan) -> Vec<f64> {
+    let mut indices = vec![1.0];
+    if plan.effects.contains(Effect::Nesting) {
+        indices.extend(scene.materials.iter().filter_map(|material| match material.surface {
+            Surface::Dielectric(Dielectric { ior, thin_walled: false, .. }) => Some(ior),
+            _ => None,
+        }));
+    }
+    indices.sort_by(f64::total_cmp);
+    indices.dedup();
+    indices
+}
+
 /// Materials, and the tables of what rough ones lose.
 fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<MaterialRecord>, Vec<f32>) {
-    let mut tables: Vec<(RoughInterface, u32)> = Vec::new();
-    let mut albedos = Vec::new();
+    let mut albedos = Albedos { values: vec![0.0], tables: Vec::new() };
+    let others = indices(scene, plan);
     let record = |material: &Material| {
         let glass = match &material.surface {
             Surface::Dielectric(glass) => glass,
             Surface::Opaque(opaque) => return opaque_record(opaque),
         };
         let &Dielectric { ior, roughness, .. } = glass;
-        let mut albedo_table = 0;
+        let (mut albedo_table, mut albedo_tables) = (0, 0);
         if plan.effects.contains(Effect::EnergyCompensation) && is_rough(material) {
-            let interface = RoughInterface { alpha: roughness * roughness, eta_i: 1.0, eta_t: ior };
-            albedo_table = match tables.iter().find(|(other, _)| *other == interface) {
-                Some(&(_, first)) => first,
-                None => {
-                    let first = albedos.len() as u32;
-                    albedos.extend(AlbedoTable::new(interface).nodes().iter().map(|&albedo| albedo as f32));
-                    tables.push((interface, first));
-                    first
-                }
-            };
+            let alpha = roughness * roughness;
+            match plan.model {
+                Model::Path => albedo_tables = albedos.pairs(alpha, ior, &others),
+                _ => albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: ior }),
+            }
         }
         // Infinite where a colour is 0: so dark that nothing is left after a millionth of the scene.
         let formula = match glass.dispersion {
@@ -179,10 +234,12 @@ fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<MaterialRecord>, V
             sellmeier_resonances: formula.resonances.map(|x| x as f32).into(),
             kind: if glass.thin_walled { MaterialRecord::PANE } else { MaterialRecord::DIELECTRIC },
             albedo_table,
+            albedo_tables,
             ..MaterialRecord::default()
         }
     };
-    (scene.materials.iter().map(record).collect(), albedos)
+    let records = scene.materials.iter().map(record).collect();
+    (records, albedos.values)
 }
 
 /// As `shaders/shared.glsl` tells the laws apart.

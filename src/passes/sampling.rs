@@ -2,9 +2,11 @@
 
 use glam::{DVec2, FloatExt as _};
 
+use super::view;
 use crate::gpu::SamplePush;
 use crate::optics::spectrum::{self, WAVELENGTHS};
-use crate::plan::Budget;
+use crate::options::Model;
+use crate::plan::{Budget, Plan};
 
 /// 1 / golden ratio: its multiples fill an interval more evenly than those of any other number.
 const GOLDEN: f64 = 0.618_033_988_749_894_9;
@@ -29,8 +31,50 @@ pub fn pixel_offsets(budget: Budget, seed: u64) -> Box<dyn Iterator<Item = DVec2
     }
 }
 
+/// Samples that every pixel takes before the host hears of them.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Round {
+    /// What they tell the shaders.
+    pub(super) push: SamplePush,
+    /// How many they are.
+    pub(super) samples: u32,
+}
+
+/// The rounds of a render, as many as it may have.
+pub(super) fn rounds(plan: &Plan) -> Box<dyn Iterator<Item = Round>> {
+    let (budget, size, seed) = (plan.budget, plan.size, plan.seed);
+    if plan.model == Model::Path {
+        return Box::new(batches(budget, seed));
+    }
+    let traces = plan.model.traces();
+    let lit = move |push| if traces { footprint(spectrum(push, budget), budget) } else { push };
+    let pushes = (0..).zip(pixel_offsets(budget, seed)).map(move |(i, offset)| view::sample_push(size, offset, i));
+    Box::new(pushes.map(move |push| Round { push: lit(push), samples: 1 }))
+}
+
+/// Batches that the means of a pixel's samples should come from: what tells their standard error within a few per cent.
+const BATCHES: u32 = 32;
+
+/// Samples of a batch where it is not known how many there will be.
+const OPEN_BATCH: u32 = 4;
+
+/// Batches of samples that are as independent of each other as random ones: each pixel's samples fill its square and whatever else they
+/// choose from evenly within a batch, so that the means of batches tell how far off theirs is. All of one size, a power of two.
+fn batches(budget: Budget, seed: u64) -> impl Iterator<Item = Round> {
+    let (count, most) = match budget {
+        Budget::Samples(count) => (count, (count / BATCHES).max(1)),
+        Budget::Seconds { most, .. } => (most, OPEN_BATCH),
+    };
+    let samples = (1 << most.ilog2()).min(1 << count.trailing_zeros());
+    (0..count / samples).map(move |batch| {
+        let push = SamplePush { sample_index: batch, samples_in_batch: samples, ..SamplePush::default() };
+        let shift = unit(scramble(seed ^ scramble(u64::from(batch))));
+        Round { push: with_lines(push, shift), samples }
+    })
+}
+
 /// `push` with the wavelengths of its sample: those of all samples share the spectrum evenly.
-pub(super) fn spectrum(push: SamplePush, budget: Budget) -> SamplePush {
+fn spectrum(push: SamplePush, budget: Budget) -> SamplePush {
     let index = f64::from(push.sample_index);
     let shift = match budget {
         // Not in the order of the lattice's first axis, or wavelengths would go with places in the pixel.
@@ -40,14 +84,17 @@ pub(super) fn spectrum(push: SamplePush, budget: Budget) -> SamplePush {
         }
         Budget::Seconds { .. } => (0.5 + index * GOLDEN).fract_gl(),
     };
-    let lines = spectrum::lines(shift);
-    let spectrum = lines.map(|line| line.weight.extend(line.wavelength).as_vec4().to_array());
+    with_lines(push, shift)
+}
+
+fn with_lines(push: SamplePush, shift: f64) -> SamplePush {
+    let spectrum = spectrum::lines(shift).map(|line| line.weight.extend(line.wavelength).as_vec4().to_array());
     SamplePush { wavelengths: WAVELENGTHS as u32, spectrum, ..push }
 }
 
 /// `push` with how wide its sample's share of the pixel is: the shares of all samples have the pixel's area, and where their number is
 /// not known those of a sample and the ones before it.
-pub(super) fn footprint(push: SamplePush, budget: Budget) -> SamplePush {
+fn footprint(push: SamplePush, budget: Budget) -> SamplePush {
     let count = match budget {
         Budget::Samples(count) => count,
         Budget::Seconds { .. } => push.sample_index + 1,
@@ -59,8 +106,12 @@ fn shift(seed: u64) -> DVec2 {
     if seed == 0 {
         return DVec2::ZERO;
     }
-    let unit = |bits: u64| (bits >> 11) as f64 / (1_u64 << 53) as f64;
     DVec2::new(unit(scramble(seed)), unit(scramble(seed ^ 0x5851_f42d_4c95_7f2d)))
+}
+
+/// From 0 to below 1.
+fn unit(bits: u64) -> f64 {
+    (bits >> 11) as f64 / (1_u64 << 53) as f64
 }
 
 /// SplitMix64 (Steele, Lea & Flood 2014).

@@ -2,21 +2,16 @@
 //! surfaces that the first has found.
 
 use std::sync::Arc;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-use super::Targets;
+use super::{RADIANCE, Targets};
 use super::resources::Resources;
+use super::slices::{GROUP, Slices};
 use crate::gpu::{
-    Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Gpu, PassTime, Result, SamplePush, Use,
+    Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result, SamplePush, Use,
     shaders,
 };
 use crate::options::Trace;
-
-/// How long one submission should take: a GPU's watchdog stays calm, and so does whoever waits at the screen.
-const SLICE: Duration = Duration::from_millis(100);
-
-/// Rows of a workgroup.
-const GROUP: u32 = 8;
 
 /// Pixels of a row that one invocation takes: `PIXELS` of `shaders/tree.glsl`.
 const PIXELS: u32 = 8;
@@ -35,8 +30,7 @@ const HEADER_BYTES: u64 = 16;
 pub(super) struct Tree {
     pipeline: ComputePipeline,
     lights: Option<Lights>,
-    /// Rows of the next slice.
-    rows: u32,
+    slices: Slices,
 }
 
 /// What lights opaque surfaces.
@@ -50,14 +44,14 @@ struct Lights {
 }
 
 /// Samples and points of opaque surfaces that wait for their lights.
-pub(super) struct Pending {
+struct Pending {
     samples: Arc<Buffer>,
-    pub(super) records: Arc<Buffer>,
+    records: Arc<Buffer>,
 }
 
 impl Pending {
     /// Room for both, next to none if no surface is opaque.
-    pub(super) fn new(gpu: &Gpu, opaque: bool) -> Result<Self> {
+    fn new(gpu: &Gpu, opaque: bool) -> Result<Self> {
         let buffer = |name, most: u32, bytes: u64| {
             let size = HEADER_BYTES + if opaque { u64::from(most) } else { 1 } * bytes;
             Buffer::new(gpu, &BufferDesc { name, size, usage: BufferUse::Storage }).map(Arc::new)
@@ -68,20 +62,41 @@ impl Pending {
         })
     }
 
-    pub(super) fn bindings(&self) -> [Bind; 2] {
+    fn bindings(&self) -> [Bind; 2] {
         [Bind::Buffer(self.samples.clone()), Bind::Buffer(self.records.clone())]
     }
 }
 
+/// What the model `tree` reads and writes beside the mean.
+pub(super) struct TreeTargets {
+    /// All of it, and the scene.
+    group: BindGroup,
+    pub(super) counts: Arc<Image>,
+    pending: Pending,
+}
+
+impl TreeTargets {
+    pub(super) fn new(gpu: &Gpu, resources: &Resources, mean: &Arc<Image>) -> Result<Self> {
+        let (width, height) = (mean.width(), mean.height());
+        let uses = &[Use::Storage, Use::CopySource];
+        let counts = Arc::new(Image::new(gpu, &ImageDesc { name: "counts", width, height, format: RADIANCE, uses })?);
+        let pending = Pending::new(gpu, resources.opaque)?;
+        let mut bindings = resources.traced.clone();
+        bindings.extend([Bind::Storage(mean.clone()), Bind::Storage(counts.clone())]);
+        bindings.extend(pending.bindings());
+        Ok(Self { group: BindGroup::new(gpu, "tree", bindings)?, counts, pending })
+    }
+}
+
 impl Tree {
-    pub(super) fn new(commands: &mut Commands, resources: &Resources, group: &BindGroup, trace: Trace) -> Result<Self> {
+    pub(super) fn new(commands: &mut Commands, resources: &Resources, targets: &TreeTargets, trace: Trace) -> Result<Self> {
         let (tree, lights) = match trace {
             Trace::Hardware => (&shaders::TREE_HARDWARE_COMP, &shaders::LIGHTS_HARDWARE_COMP),
             Trace::Software => (&shaders::TREE_COMP, &shaders::LIGHTS_COMP),
         };
         let gpu = commands.gpu().clone();
         let bytes = size_of::<SamplePush>() as u32;
-        let pipeline = |shader| ComputePipeline::new(&gpu, shader, group, bytes, &resources.specialization);
+        let pipeline = |shader| ComputePipeline::new(&gpu, shader, &targets.group, bytes, &resources.specialization);
         let lights = match resources.opaque {
             false => None,
             true => Some(Lights {
@@ -94,23 +109,23 @@ impl Tree {
                 )?,
             }),
         };
-        Ok(Self { pipeline: pipeline(tree)?, lights, rows: 2 * GROUP })
+        Ok(Self { pipeline: pipeline(tree)?, lights, slices: Slices::new() })
     }
 
-    /// One sample of every pixel, in slices of rows; each is as high as the last one's time suggests.
+    /// One sample of every pixel, in slices of rows.
     pub(super) fn sample(
         &mut self,
         commands: &mut Commands,
         targets: &Targets,
+        tree: &TreeTargets,
         push: SamplePush,
     ) -> Result<Vec<PassTime>> {
-        let Some(tree) = &targets.tree else { return Ok(Vec::new()) };
         let (width, height) = (targets.mean.width(), targets.mean.height());
         let most_rows = (MOST_SAMPLES / width / GROUP).max(1) * GROUP;
         let mut times = Vec::new();
         let mut first_row = 0;
         while first_row < height {
-            let rows = self.rows.min(most_rows).min((height - first_row).next_multiple_of(GROUP));
+            let rows = self.slices.next((height - first_row).min(most_rows));
             let push = SamplePush { first_row, ..push };
             let start = Instant::now();
             times.extend(commands.run(|cmd| {
@@ -132,16 +147,11 @@ impl Tree {
                 }
             })?);
             if rows > GROUP && self.lights.as_ref().is_some_and(Lights::lost_records) {
-                self.rows = (rows / 2).next_multiple_of(GROUP);
+                self.slices.halve(rows);
                 continue;
             }
             first_row += rows;
-            let spent = start.elapsed();
-            if spent < SLICE / 2 {
-                self.rows = rows.saturating_mul(2).min(height.next_multiple_of(GROUP));
-            } else if spent > SLICE * 2 {
-                self.rows = (rows / 2).next_multiple_of(GROUP).max(GROUP);
-            }
+            self.slices.took(rows, start.elapsed(), height);
         }
         Ok(times)
     }
@@ -152,29 +162,5 @@ impl Lights {
     fn lost_records(&self) -> bool {
         let found: Option<&[u8; 4]> = self.header.bytes().first_chunk();
         found.is_some_and(|&count| u32::from_ne_bytes(count) > MOST_RECORDS)
-    }
-}
-
-/// What the model counted, as means over the samples of each pixel, row 0 at the top.
-#[derive(Clone, Debug)]
-pub struct TreeCounts {
-    /// Throughput that was cut off.
-    pub discarded: Vec<f32>,
-    /// Interfaces that scattered light.
-    pub interfaces: Vec<f32>,
-    /// Rays in all.
-    pub rays: u64,
-}
-
-impl TreeCounts {
-    pub(super) fn new(mean: &[u8], counts: &[u8], samples: u32) -> Self {
-        let texels = |bytes: &[u8]| bytemuck::allocation::pod_collect_to_vec::<u8, [f32; 4]>(bytes);
-        let counts = texels(counts);
-        let rays: f64 = counts.iter().map(|&[_, rays, ..]| f64::from(rays)).sum();
-        Self {
-            discarded: texels(mean).iter().map(|&[.., discarded]| discarded).collect(),
-            interfaces: counts.iter().map(|&[interfaces, ..]| interfaces).collect(),
-            rays: (rays * f64::from(samples)).round() as u64,
-        }
     }
 }

@@ -34,7 +34,7 @@ pub struct Stats {
     pub rays: Option<u64>,
     pub peak_gpu_bytes: u64,
     pub discarded: Option<DiscardedStats>,
-    pub stderr: Option<()>,
+    pub stderr: Option<StderrStats>,
     pub non_finite_pixels: usize,
     pub validation_messages: Option<usize>,
 }
@@ -85,6 +85,22 @@ impl DiscardedStats {
     }
 }
 
+/// Standard error of the means, of all pixels and channels.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/stats.md describes the members")]
+pub struct StderrStats {
+    pub mean: f64,
+}
+
+impl StderrStats {
+    /// None where samples are too few to tell.
+    fn new(stderr: &[[f32; 3]]) -> Option<Self> {
+        let sum: f64 = stderr.iter().flatten().map(|&x| f64::from(x)).sum();
+        let mean = sum / (3 * stderr.len()) as f64;
+        mean.is_finite().then_some(Self { mean })
+    }
+}
+
 /// Host times before the first sample, in milliseconds.
 #[derive(Clone, Copy, Debug, Serialize)]
 #[allow(missing_docs, reason = "docs/stats.md describes the members")]
@@ -112,6 +128,7 @@ impl Stats {
     pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, run: Run) -> Self {
         let passes: Vec<_> =
             rendered.passes.iter().map(|&PassTime { name, gpu_ms }| PassStats { name, gpu_ms }).collect();
+        let counts = rendered.counts.as_ref();
         let finite = |pixel: &&[f32; 3]| pixel.iter().all(|value| value.is_finite());
         Self {
             schema: 1,
@@ -135,10 +152,10 @@ impl Stats {
                 pipelines: ms(rendered.pipelines),
             },
             wall_ms: ms(run.wall),
-            rays: rendered.tree.as_ref().map(|tree| tree.rays),
+            rays: counts.map(|counts| counts.rays),
             peak_gpu_bytes: run.peak_gpu_bytes,
-            discarded: rendered.tree.as_ref().map(|tree| DiscardedStats::new(&tree.discarded)),
-            stderr: None,
+            discarded: counts.and_then(|counts| counts.discarded.as_deref()).map(DiscardedStats::new),
+            stderr: counts.and_then(|counts| counts.stderr.as_deref()).and_then(StderrStats::new),
             non_finite_pixels: rendered.radiance.len() - rendered.radiance.iter().filter(finite).count(),
             validation_messages: run.validation_messages,
         }

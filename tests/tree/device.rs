@@ -91,14 +91,15 @@ impl Device {
 
     fn planned(&self, scene: &Scene, plan: &Plan) -> Picture {
         let rendered = render(&self.0.gpu, scene, plan, &mut |_| {}).expect("a picture");
-        let counts = rendered.tree.expect("counts");
-        let all = rendered.radiance.iter().flatten().chain(&counts.discarded).chain(&counts.interfaces);
+        let counts = rendered.counts.expect("counts");
+        let discarded = counts.discarded.expect("what was cut off");
+        let all = rendered.radiance.iter().flatten().chain(&discarded).chain(&counts.interfaces);
         let bad = all.filter(|value| !(value.is_finite() && **value >= 0.0)).count();
         assert_eq!(bad, 0, "{}: values that are not finite or below 0", scene.name);
         let wide = |values: Vec<f32>| values.into_iter().map(f64::from).collect();
         Picture {
             radiance: rendered.radiance.into_iter().map(|pixel| DVec3::from_array(pixel.map(f64::from))).collect(),
-            discarded: wide(counts.discarded),
+            discarded: wide(discarded),
             interfaces: wide(counts.interfaces),
         }
     }

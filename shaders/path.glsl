@@ -1,0 +1,382 @@
+// Paths of light from the camera on, at random: every effect, without bias up to the longest chain of interfaces. Multiple importance
+// sampling (Veach & Guibas 1995) joins directions chosen by a surface with those chosen by how bright the environment is.
+//
+// As in tree.glsl one loop does everything, a ray a turn, and radiance is that of a medium of index 1.
+#ifndef PATH_GLSL
+#define PATH_GLSL
+
+#include "trace.glsl"
+#include "arrival.glsl"
+#include "camera.glsl"
+#include "compensation.glsl"
+#include "effects.glsl"
+#include "environment.glsl"
+#include "media.glsl"
+#include "opaque.glsl"
+#include "rough.glsl"
+#include "skylight.glsl"
+#include "sobol.glsl"
+#include "texture.glsl"
+
+layout(local_size_x = 8, local_size_y = 8) in;
+
+// How light is looked for at surfaces that spread it: by lights alone, by the surface alone, or by both; for tests.
+layout(constant_id = 66) const bool SAMPLE_LIGHTS = true;
+layout(constant_id = 67) const bool SAMPLE_SURFACES = true;
+
+layout(set = 0, binding = 14, rgba32f) uniform image2D mean;    // radiance
+layout(set = 0, binding = 15, rgba32f) uniform image2D counts;  // interfaces, rays
+layout(set = 0, binding = 16, rgba32f) uniform image2D spread;  // sum of squared differences of the batches' means from their mean, and their number
+
+// Pixels in a row of a workgroup's that one invocation takes, one after the other; as in src/passes/path.rs.
+const int PIXELS = 4;
+
+// From here on a faint path may end, with a probability that those going on make up for.
+const uint ROULETTE_DEPTH = 4;
+const float LEAST_SURVIVAL = 0.05;
+
+// The density of a direction that could not have been another.
+const float NO_PDF = -1.0;
+
+struct Ray {
+    vec3 origin;
+    vec3 direction;
+    vec3 throughput;
+    float reach;      // distance of the point light at its end; infinite: none
+    Whereabouts at;
+    Found left;
+    uint passed;      // boundaries in a row between equal indices
+};
+
+// Pairs of numbers that a path takes: for the camera, and for each interface.
+const uint PAIR_PIXEL = 0;
+const uint PAIR_WAVELENGTH = 1;
+const uint PAIRS_BEFORE = 2;
+const uint PAIR_DIRECTION = 0;
+const uint PAIR_CHOICE = 1;
+const uint PAIR_LIGHT = 2;
+const uint PAIR_LIGHT_CHOICE = 3;
+const uint PAIRS_OF_INTERFACE = 4;
+
+float PowerHeuristic(float pdf, float other)
+{
+    float ratio = other / max(pdf, 1e-30);
+    return 1.0 / (1.0 + ratio * ratio);
+}
+
+// An interface that a path has met, in the local frame.
+struct Met {
+    bool isOpaque;
+    bool isRough;      // a dielectric that spreads light
+    OpaqueSurface surface;
+    float alpha;
+    float etaI;
+    float etaT;
+    float scale;       // what single bounces between facets lose, given back
+    vec3 wi;
+};
+
+// What directions are worth: the BSDF times the cosine of wo, without the factor of the indices, and their density.
+struct Worth {
+    vec3 value;
+    float pdf;
+};
+
+Worth Evaluate(Met met, vec3 wo)
+{
+    if (met.isOpaque) return Worth(EvaluateOpaque(met.surface, met.wi, wo), OpaquePdf(met.surface, met.wi, wo));
+    RoughValue rough = EvaluateRough(met.wi, wo, met.alpha, met.etaI, met.etaT);
+    bool reflected = wo.z > 0.0;
+    if (reflected ? !REFLECTION : !TRANSMISSION) return Worth(vec3(0.0), rough.pdf);
+    float ratio = reflected ? 1.0 : met.etaT / met.etaI;
+    return Worth(vec3(rough.value * met.scale * ratio * ratio), rough.pdf);
+}
+
+// A direction that a path goes on in.
+struct Next {
+    vec3 wo;
+    vec3 weight;
+    float pdf;        // NO_PDF: none other was possible
+};
+
+// Of an opaque surface: u chooses the direction, `choice` between what is mirrored and what is scattered below.
+Next SampleOpaque(OpaqueSurface surface, vec3 wi, vec2 u, float choice)
+{
+    float chance = SpecularChance(surface, wi);
+    bool isSpecular = choice < chance;
+    if (isSpecular && IsMirror(surface)) return Next(vec3(-wi.xy, wi.z), FacetReflectance(surface, wi.z) / chance, NO_PDF);
+    vec3 wo = isSpecular ? SampleSpecular(surface, wi, u).wo : SampleDiffuse(surface, wi, u).wo;
+    float pdf = OpaquePdf(surface, wi, wo);
+    return Next(wo, pdf > 0.0 ? EvaluateOpaque(surface, wi, wo) / pdf : vec3(0.0), pdf);
+}
+
+Next SampleNext(Met met, vec2 u, float choice)
+{
+    if (met.isOpaque) return SampleOpaque(met.surface, met.wi, u, choice);
+    RoughSample rough = SampleRough(met.wi, met.alpha, met.etaI, met.etaT, vec3(u, choice));
+    bool reflected = rough.wo.z > 0.0;
+    if (reflected ? !REFLECTION : !TRANSMISSION) rough.weight = 0.0;
+    float ratio = reflected ? 1.0 : met.etaT / met.etaI;
+    return Next(rough.wo, vec3(rough.weight * met.scale * ratio * ratio), rough.pdf);
+}
+
+bool IsRough(Material material)
+{
+    return material.roughness > SMOOTH_ROUGHNESS;
+}
+
+Met MetAt(Material material, Arrival arrival, bool isOpaque, vec3 wi, float etaI, float etaT)
+{
+    Met met;
+    met.isOpaque = isOpaque;
+    met.surface = OpaqueSurface(vec3(0.0), vec3(0.0), 0.0, 1.0);
+    if (isOpaque) {
+        vec3 color = BaseColor(material, arrival.found, arrival.weights, mat2(0.0));
+        met.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
+    }
+    met.alpha = material.roughness * material.roughness;
+    met.etaI = etaI;
+    met.etaT = etaT;
+    met.wi = normalize(wi);
+    met.scale = 1.0;
+    if (ENERGY_COMPENSATION && !isOpaque) met.scale = RoughCompensation(RoughTable(material.albedoTables, etaI, etaT), met.wi.z);
+    return met;
+}
+
+// Moves the means of a pixel by a batch of samples, and what says how far batches are from each other: B. P. Welford, "Note on a Method
+// for Calculating Corrected Sums of Squares and Products", Technometrics 1962.
+void AddBatch(ivec2 place, vec3 value, float interfaces, float rays)
+{
+    vec3 squares = vec3(0.0);
+    vec4 count = vec4(interfaces, rays, 0.0, 0.0);
+    vec3 moved = value;
+    if (sampleIndex != 0) {
+        float batches = float(sampleIndex + 1);
+        vec3 before = imageLoad(mean, place).rgb;
+        moved = before + (value - before) / batches;
+        squares = imageLoad(spread, place).rgb + (value - before) * (value - moved);
+        vec4 counted = imageLoad(counts, place);
+        count = counted + (count - counted) / batches;
+    }
+    imageStore(mean, place, vec4(moved, 1.0));
+    imageStore(spread, place, vec4(squares, float(sampleIndex + 1)));
+    imageStore(counts, place, count);
+}
+
+// A ray from an interface towards a light that it may see: false where there is none.
+bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pair, Ray path, out Ray light)
+{
+    light = path;
+    light.left = arrival.found;
+    light.passed = 0;
+    light.reach = LARGEST_FLOAT;
+    bool sky = ENVIRONMENT_IMAGE && cellCount.x != 0 && SAMPLE_LIGHTS;
+    bool points = DIRECT_LIGHT && frame.lightCount > 0;
+    if (!sky && !points) return false;
+    uvec2 choice = PointBits(sequence, pair + PAIR_LIGHT_CHOICE);
+    vec2 u = Point(sequence, pair + PAIR_LIGHT);
+    // Half of the time one, half of the time the other, where there are both.
+    bool toSky = sky && (!points || choice.x < 0x80000000u);
+    if (sky && points) choice.x <<= 1;
+    float chance = sky && points ? 0.5 : 1.0;
+    vec3 radiance;
+    float pdf = 0.0;
+    if (toSky) {
+        SkySample chosen = SampleSky(choice, u);
+        light.direction = normalize(chosen.direction);
+        pdf = chosen.pdf;
+        radiance = SampleEnvironment(light.direction, 0.0) / pdf;
+    } else {
+        uint high;
+        uint low;
+        umulExtended(choice.x, frame.lightCount, high, low);
+        vec3 toLight = lights[high].position - arrival.position;
+        light.reach = max(length(toLight), 1e-30);
+        light.direction = toLight / light.reach;
+        radiance = lights[high].intensity * (float(frame.lightCount) / (light.reach * light.reach));
+    }
+    vec3 wo = light.direction * toWorld;
+    // On the same side of the surface and of its interpolated normal.
+    bool above = (dot(light.direction, arrival.faceNormal) > 0.0) != arrival.behind;
+    if (above != (wo.z > 0.0)) return false;
+    Worth worth = Evaluate(met, wo);
+    float weight = toSky && SAMPLE_SURFACES ? PowerHeuristic(pdf, worth.pdf) : 1.0;
+    light.throughput = path.throughput * worth.value * radiance * (weight / chance);
+    light.origin = LeaveFrom(arrival, light.direction);
+    return Largest(abs(light.throughput)) > 0.0;
+}
+
+// What the next ray is.
+const uint NEXT_PIXEL = 0;   // the camera's of the next pixel
+const uint NEXT_SAMPLE = 1;  // the camera's of this one once more
+const uint NEXT_RAY = 2;     // the path's, or the one towards a light
+
+void main()
+{
+    uint next = NEXT_PIXEL;
+    int column = -1;
+    ivec2 place = ivec2(0);
+    uint number = 0;
+    vec3 sum = vec3(0.0);
+    uint interfaces = 0;
+    uint rays = 0;
+
+    Whereabouts atCamera = Whereabouts(frame.cameraMedium, Bodies(frame.cameraBodies));
+    Ray path = Ray(vec3(0.0), vec3(0.0, 0.0, -1.0), vec3(0.0), LARGEST_FLOAT, atCamera, NOWHERE, 0);
+    Ray light = path;
+    bool toLight = false;
+    bool goesOn = false;
+    Sequence sequence = Sequence(0, 0);
+    uint depth = 0;
+    float pdf = NO_PDF;
+    uint line = 0;
+    bool isColored = false;
+
+    for (;;) {
+        if (next == NEXT_PIXEL) {
+            if (++column == PIXELS) break;
+            place = ivec2(8 * (PIXELS * gl_WorkGroupID.x + column) + gl_LocalInvocationID.x, gl_GlobalInvocationID.y + firstRow);
+            if (any(greaterThanEqual(place, imageSize(mean)))) continue;
+            number = interfaces = rays = 0;
+            sum = vec3(0.0);
+            sequence.seed = Pcg3d(uvec3(place, frame.seed) + uvec3(0, 0, sampleIndex * GOLDEN_STEP)).x;
+            next = NEXT_SAMPLE;
+        }
+        if (next == NEXT_SAMPLE) {
+            sequence.index = number;
+            vec2 pixel = vec2(place) + Point(sequence, PAIR_PIXEL);
+            path = Ray(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), LARGEST_FLOAT, atCamera, NOWHERE, 0);
+            line = DISPERSION ? uint(Point(sequence, PAIR_WAVELENGTH).x * float(wavelengths)) : 0;
+            isColored = false;
+            depth = 0;
+            pdf = NO_PDF;
+            toLight = false;
+            goesOn = true;
+            next = NEXT_RAY;
+        }
+        bool isLight = toLight;
+        Ray ray = path;
+        if (isLight) ray = light;
+        Found found = NOWHERE;
+        bool any = Trace(ray.origin, ray.direction, ray.left, found);
+        ++rays;
+
+        Arrival arrival;
+        Material material = materials[0];
+        if (any) arrival = ArriveAt(found, ray.origin, ray.direction);
+        if (any && isLight) any = arrival.distance < ray.reach;
+        bool isOpaque = false;
+        bool isPane = false;
+        bool passes = false;
+        Boundary boundary = Boundary(ray.at, ray.at);
+        float wavelength = DISPERSION ? spectrum[line].w : D_LINE;
+        float etaI = 1.0;
+        float etaT = 1.0;
+        bool disperses = false;
+        if (any) {
+            material = materials[instances[found.instance].material];
+            isOpaque = OPAQUE && material.kind == KIND_OPAQUE;
+            isPane = THIN_WALLED && material.kind == KIND_PANE;
+            if (!isOpaque && !isPane) boundary = BoundaryOf(found.instance, arrival.behind, ray.at);
+            if (ABSORPTION && boundary.before.medium != 0) {
+                ray.throughput *= Transmittance(materials[boundary.before.medium - 1].absorption, arrival.distance);
+            }
+            etaI = IndexOf(boundary.before.medium, wavelength, disperses);
+            etaT = isPane ? material.refractionIndex : isOpaque ? etaI : IndexOf(boundary.beyond.medium, wavelength, disperses);
+            passes = !isOpaque && etaI == etaT;
+        }
+        bool ends = !any;
+        if (passes) {
+            ray.at = boundary.beyond;
+            ray.reach -= ray.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
+            ray.origin = LeaveFrom(arrival, ray.direction);
+            ray.left = found;
+            ends = ++ray.passed > MOST_PASSED;
+        }
+
+        if (isLight) {
+            // Only what is not bent arrives.
+            if (!any) sum += ray.throughput;
+            toLight = passes && !ends;
+            light = ray;
+        } else if (!any) {
+            bool isSeen = frame.environmentVisible != 0 || depth > 0;
+            if (isSeen) {
+                float weight = 1.0;
+                if (ENVIRONMENT_IMAGE && SAMPLE_LIGHTS && cellCount.x != 0 && pdf > 0.0) {
+                    weight = SAMPLE_SURFACES ? PowerHeuristic(pdf, SkyPdf(ray.direction)) : 0.0;
+                }
+                sum += weight * ray.throughput * SampleEnvironment(ray.direction, 0.0);
+            }
+            goesOn = false;
+        } else if (passes) {
+            path = ray;
+            goesOn = !ends;
+        } else {
+            if (isOpaque) sum += ray.throughput * material.emission / (etaI * etaI);
+            goesOn = depth < frame.maxDepth;
+        }
+
+        bool scatters = !isLight && any && !passes;
+        if (scatters && (isOpaque || goesOn)) ++interfaces;
+        if (scatters && goesOn) {
+            if (DISPERSION && disperses && !isColored) {
+                ray.throughput *= float(wavelengths) * spectrum[line].rgb;
+                isColored = true;
+            }
+            uint pair = PAIRS_BEFORE + PAIRS_OF_INTERFACE * depth;
+            ++depth;
+            vec3 wi = -ray.direction;
+            vec3 faceNormal = arrival.behind ? -arrival.faceNormal : arrival.faceNormal;
+            vec3 normal = NormalTowards(arrival.behind ? -arrival.normal : arrival.normal, wi);
+            vec2 choice = Point(sequence, pair + PAIR_CHOICE);
+            vec3 direction = ray.direction;
+            vec3 weight = vec3(1.0);
+            pdf = NO_PDF;
+            bool reflected = false;
+            bool isRough = ROUGHNESS && !isOpaque && !isPane && IsRough(material);
+            if (isOpaque || isRough) {
+                mat3 toWorld = BasisAround(normal);
+                Met met = MetAt(material, arrival, isOpaque, wi * toWorld, etaI, etaT);
+                toLight = AskLight(met, toWorld, arrival, sequence, pair, ray, light);
+                if (toLight) light.at = dot(light.direction, faceNormal) < 0.0 ? boundary.beyond : boundary.before;
+                Next sampled = SampleNext(met, Point(sequence, pair + PAIR_DIRECTION), choice.x);
+                direction = toWorld * sampled.wo;
+                weight = sampled.weight;
+                pdf = sampled.pdf;
+                reflected = sampled.wo.z > 0.0;
+                // A direction that the face lies in the way of is bent; no light is asked for there.
+                vec3 side = reflected ? faceNormal : -faceNormal;
+                if (dot(direction, side) < LEAST_SLOPE) pdf = NO_PDF;
+                direction = DirectionAbove(normalize(direction), side);
+            } else {
+                Refraction refraction = Refract(wi, normal, etaI, etaT);
+                float reflectance = refraction.crossed.reflectance;
+                if (isPane && !refraction.crossed.total) reflectance = 2.0 * reflectance / (1.0 + reflectance);
+                reflected = refraction.crossed.total || choice.x < reflectance;
+                if (reflected ? !REFLECTION : !TRANSMISSION) weight = vec3(0.0);
+                if (reflected) direction = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
+                else if (!isPane) direction = DirectionAbove(normalize(refraction.wt), -faceNormal);
+            }
+            path = Ray(LeaveFrom(arrival, direction), direction, ray.throughput * weight, LARGEST_FLOAT,
+                reflected ? boundary.before : boundary.beyond, found, 0);
+            float size = Largest(abs(path.throughput));
+            goesOn = size > 0.0;
+            if (depth > ROULETTE_DEPTH && size < 1.0) {
+                float survival = max(size, LEAST_SURVIVAL);
+                goesOn = goesOn && choice.y < survival;
+                path.throughput /= survival;
+            }
+        }
+
+        if (goesOn || toLight) continue;
+        if (++number < samplesInBatch) {
+            next = NEXT_SAMPLE;
+        } else {
+            AddBatch(place, sum / float(number), float(interfaces) / float(number), float(rays) / float(number));
+            next = NEXT_PIXEL;
+        }
+    }
+}
+
+#endif

@@ -1,0 +1,77 @@
+//! What models that trace count beside the light. In flow images as the device has them, out flows [`Counts`].
+
+use bytemuck::allocation::pod_collect_to_vec;
+
+/// Means over the samples of each pixel, row 0 at the top.
+#[derive(Clone, Debug)]
+pub struct Counts {
+    /// Throughput that `tree` cut off.
+    pub discarded: Option<Vec<f32>>,
+    /// Standard error of the radiance that `path` found, of each channel; infinite with a single batch of samples.
+    pub stderr: Option<Vec<[f32; 3]>>,
+    /// Interfaces that scattered light.
+    pub interfaces: Vec<f32>,
+    /// Rays in all.
+    pub rays: u64,
+}
+
+impl Counts {
+    pub(super) fn of_trees(mean: &[u8], counts: &[u8], samples: u32) -> Self {
+        let discarded = texels(mean).iter().map(|&[.., discarded]| discarded).collect();
+        Self { discarded: Some(discarded), ..Self::new(counts, samples) }
+    }
+
+    pub(super) fn of_paths(counts: &[u8], spread: &[u8], samples: u32) -> Self {
+        let stderr = texels(spread).iter().map(|&texel| standard_error(texel).map(|error| error as f32)).collect();
+        Self { stderr: Some(stderr), ..Self::new(counts, samples) }
+    }
+
+    fn new(counts: &[u8], samples: u32) -> Self {
+        let counts = texels(counts);
+        let rays: f64 = counts.iter().map(|&[_, rays, ..]| f64::from(rays)).sum();
+        Self {
+            discarded: None,
+            stderr: None,
+            interfaces: counts.iter().map(|&[interfaces, ..]| interfaces).collect(),
+            rays: (rays * f64::from(samples)).round() as u64,
+        }
+    }
+}
+
+/// The mean over pixels and channels of standard error / (value + 0.1).
+pub(super) fn relative_error(mean: &[u8], spread: &[u8]) -> f64 {
+    let pairs = texels(mean);
+    let errors: f64 = pairs
+        .iter()
+        .zip(texels(spread))
+        .flat_map(|(&[r, g, b, _], texel)| [r, g, b].into_iter().zip(standard_error(texel)))
+        .map(|(value, error)| error / (f64::from(value) + 0.1))
+        .sum();
+    errors / (3 * pairs.len()) as f64
+}
+
+/// Of the mean of independent batches, from the sum of their squared differences from it and their number.
+fn standard_error([r, g, b, batches]: [f32; 4]) -> [f64; 3] {
+    let batches = f64::from(batches);
+    [r, g, b].map(|squares| match batches {
+        1.0 => f64::INFINITY,
+        _ => (f64::from(squares) / (batches * (batches - 1.0))).sqrt(),
+    })
+}
+
+fn texels(bytes: &[u8]) -> Vec<[f32; 4]> {
+    pod_collect_to_vec(bytes)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_standard_error_is_that_of_a_textbook() {
+        // 1, 2, 3, 4: variance 5/3, of the mean of four 5/12.
+        let [r, g, b] = standard_error([5.0, 0.0, 20.0, 4.0]);
+        assert!((r - (5.0_f64 / 12.0).sqrt()).abs() < 1e-12 && g == 0.0 && (b - 2.0 * r).abs() < 1e-12);
+        assert_eq!(standard_error([0.0, 0.0, 0.0, 1.0]), [f64::INFINITY; 3]);
+    }
+}

@@ -1,0 +1,83 @@
+//! The model `path`: paths of light at random, a batch of samples of every pixel at a time, by one compute shader.
+
+use std::sync::Arc;
+use std::time::Instant;
+
+use super::resources::Resources;
+use super::slices::{GROUP, Slices};
+use super::{RADIANCE, Targets};
+use crate::gpu::{
+    Bind, BindGroup, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result, SamplePush, Use, shaders,
+};
+use crate::options::Trace;
+
+/// Pixels of a row that one invocation takes: `PIXELS` of `shaders/path.glsl`.
+const PIXELS: u32 = 4;
+
+pub(super) struct Path {
+    pipeline: ComputePipeline,
+    slices: Slices,
+}
+
+/// What the model reads and writes beside the mean.
+pub(super) struct PathTargets {
+    /// All of it, and the scene.
+    group: BindGroup,
+    pub(super) counts: Arc<Image>,
+    /// Sums of squared differences between the means of batches.
+    pub(super) spread: Arc<Image>,
+}
+
+impl PathTargets {
+    pub(super) fn new(gpu: &Gpu, resources: &Resources, mean: &Arc<Image>) -> Result<Self> {
+        let (width, height) = (mean.width(), mean.height());
+        let uses = &[Use::Storage, Use::CopySource];
+        let image = |name| Image::new(gpu, &ImageDesc { name, width, height, format: RADIANCE, uses }).map(Arc::new);
+        let (counts, spread) = (image("counts")?, image("spread")?);
+        let mut bindings = resources.traced.clone();
+        bindings.extend([mean, &counts, &spread].map(|image| Bind::Storage(image.clone())));
+        bindings.extend(resources.sky.clone());
+        Ok(Self { group: BindGroup::new(gpu, "path", bindings)?, counts, spread })
+    }
+}
+
+impl Path {
+    pub(super) fn new(gpu: &Gpu, resources: &Resources, targets: &PathTargets, trace: Trace) -> Result<Self> {
+        let shader = match trace {
+            Trace::Hardware => &shaders::PATH_HARDWARE_COMP,
+            Trace::Software => &shaders::PATH_COMP,
+        };
+        let bytes = size_of::<SamplePush>() as u32;
+        let pipeline = ComputePipeline::new(gpu, shader, &targets.group, bytes, &resources.specialization)?;
+        Ok(Self { pipeline, slices: Slices::new() })
+    }
+
+    /// One batch of samples of every pixel, in slices of rows.
+    pub(super) fn batch(
+        &mut self,
+        commands: &mut Commands,
+        targets: &Targets,
+        path: &PathTargets,
+        push: SamplePush,
+    ) -> Result<Vec<PassTime>> {
+        let (width, height) = (targets.mean.width(), targets.mean.height());
+        let mut times = Vec::new();
+        let mut first_row = 0;
+        while first_row < height {
+            let rows = self.slices.next(height - first_row);
+            let start = Instant::now();
+            times.extend(commands.run(|cmd| {
+                for image in [&targets.mean, &path.counts, &path.spread] {
+                    cmd.use_image(image, Use::Storage);
+                }
+                cmd.timed("path", |cmd| {
+                    let groups = [width.div_ceil(GROUP * PIXELS), rows / GROUP, 1];
+                    cmd.dispatch(&self.pipeline, &path.group, &SamplePush { first_row, ..push }, groups);
+                });
+            })?);
+            first_row += rows;
+            self.slices.took(rows, start.elapsed(), height);
+        }
+        Ok(times)
+    }
+}
