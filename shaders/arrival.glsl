@@ -50,10 +50,7 @@ Arrival ArriveAt(Found found, vec3 origin, vec3 direction)
     ShearedRay ray = ShearRay(toObject * vec4(origin, 1.0), mat3(toObject) * direction);
     Meeting meeting;
     // Where a device's own test says that a triangle is met and this one does not, it is next to an edge.
-    if (!MeetTriangle(ray, a, b, c, meeting)) {
-        vec3 away = cross(b - a, c - a);
-        meeting = Meeting(0.0, vec3(1.0 / 3.0), dot(away, mat3(toObject) * direction) > 0.0);
-    }
+    if (!MeetTriangle(ray, a, b, c, meeting)) meeting = MeetingAtEdge(ray, a, b, c);
 
     Arrival arrival;
     arrival.found = found;

@@ -86,11 +86,11 @@ vec3 SampleEnvironment(vec3 direction, mat2x3 sides, int longest)
 {
     if (!ENVIRONMENT_IMAGE) return frame.environmentRadiance;
     sides *= float(frame.environmentSize.y) / PI;
-    Row row = RowOver(dot(sides[0], sides[0]), dot(sides[0], sides[1]), dot(sides[1], sides[1]), longest);
+    Row row = RowOver(dot(sides[0], sides[0]), dot(sides[0], sides[1]), dot(sides[1], sides[1]), longest,
+        float(frame.environmentLevels - 1));
     vec3 axis = sides * row.axis * (PI / float(frame.environmentSize.y));
-    float lod = min(row.lod, float(frame.environmentLevels - 1));
-    int fine = int(lod);
-    float coarse = lod - float(fine);
+    int fine = int(row.lod);
+    float coarse = row.lod - float(fine);
     vec3 sum = vec3(0.0);
     for (int i = 0; i < row.count; ++i) {
         vec2 uv = EnvironmentPlace(direction + PlaceInRow(row, i) * axis);

@@ -16,7 +16,7 @@ const float WIDTH_OF_TEXEL = 1.7320508;
 
 // For a parallelogram: products of its sides with themselves and one with the other, in texels of the first level. A row of at most
 // `longest`: shorter ones see more than the parallelogram.
-Row RowOver(float firstSquared, float product, float secondSquared, int longest)
+Row RowOver(float firstSquared, float product, float secondSquared, int longest, float lastLevel)
 {
     // Eigenvalues of the second moments, and the eigenvector of the larger.
     float middle = 0.5 * (firstSquared + secondSquared);
@@ -28,7 +28,7 @@ Row RowOver(float firstSquared, float product, float secondSquared, int longest)
     float norm = length(axis);
     Row row;
     row.axis = norm > 0.0 ? axis / norm : vec2(1.0, 0.0);
-    row.lod = max(log2(max(max(width, size / float(longest)), 1e-3) / WIDTH_OF_TEXEL), 0.0);
+    row.lod = clamp(log2(max(max(width, size / float(longest)), 1e-3) / WIDTH_OF_TEXEL), 0.0, lastLevel);
     row.count = clamp(int(ceil(size / (WIDTH_OF_TEXEL * exp2(row.lod)) - 1e-3)), 1, longest);
     return row;
 }

@@ -60,10 +60,13 @@ Differentials Transferred(Differentials before, vec3 direction, Arrival arrival)
 // How the weights of the second and the third corner change with a position on the triangle.
 mat2 WeightDifferentials(Arrival arrival, mat2x3 position)
 {
-    vec3 normal = cross(arrival.edges[0], arrival.edges[1]);
-    float scale = 1.0 / max(dot(normal, normal), 1e-37);
-    vec2 second = scale * (cross(arrival.edges[1], normal) * position);
-    vec2 third = scale * (cross(normal, arrival.edges[0]) * position);
+    // In lengths of the longer edge, whose squares of squares are numbers.
+    float size = max(length(arrival.edges[0]), length(arrival.edges[1]));
+    mat2x3 edges = arrival.edges / max(size, 1e-30);
+    vec3 normal = cross(edges[0], edges[1]);
+    float scale = 1.0 / max(dot(normal, normal) * size, 1e-30);
+    vec2 second = scale * (cross(edges[1], normal) * position);
+    vec2 third = scale * (cross(normal, edges[0]) * position);
     return mat2(second.x, third.x, second.y, third.y);
 }
 

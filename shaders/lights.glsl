@@ -36,8 +36,8 @@ Lit LitAt(Record record)
     vec3 normal = lit.arrival.behind ? -lit.arrival.normal : lit.arrival.normal;
     lit.toWorld = BasisAround(NormalTowards(normal, -record.direction));
     lit.wi = normalize(-record.direction * lit.toWorld);
-    mat2 sides = mat2(unpackHalf2x16(record.footprint.x), unpackHalf2x16(record.footprint.y));
-    vec3 color = BaseColor(material, found, lit.arrival.weights, sides);
+    vec3 color = material.baseColor;
+    if (TEXTURES && material.texture != 0) color = vec3(unpackUnorm2x16(record.color.x), unpackUnorm2x16(record.color.y).x);
     lit.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
     return lit;
 }
@@ -69,7 +69,11 @@ bool AskFor(uint number, Record record, Lit lit, out LightRay ray)
         vec3 toLight = lights[number].position - lit.arrival.position;
         ray.reach = max(length(toLight), 1e-30);
         wo = toLight / ray.reach * lit.toWorld;
-        ray.throughput = EvaluateOpaque(lit.surface, lit.wi, wo) * lights[number].intensity / (ray.reach * ray.reach);
+        // Light is given as it is in the medium that the surface lies in.
+        bool disperses = false;
+        float index = IndexOf(record.medium, D_LINE, disperses);
+        float spread = ray.reach * index;
+        ray.throughput = EvaluateOpaque(lit.surface, lit.wi, wo) * lights[number].intensity / (spread * spread);
         if (!DIRECT_LIGHT) ray.throughput = vec3(0.0);
         ray.lod = 0.0;
     } else {
@@ -90,33 +94,27 @@ bool AskFor(uint number, Record record, Lit lit, out LightRay ray)
     ray.left = lit.arrival.found;
     ray.at = Whereabouts(record.medium, Bodies(record.bodies));
     bool above = (dot(ray.direction, lit.arrival.faceNormal) > 0.0) != lit.arrival.behind;
-    return above && Largest(ray.throughput) > 0.0;
+    return above && Largest(abs(ray.throughput)) > 0.0;
 }
 
 // What a dielectric at `arrival` leaves of a light ray that goes straight through it.
-void PassThrough(inout LightRay light, uint instance, Material material, Arrival arrival)
+void PassThrough(inout LightRay light, Material material, Arrival arrival)
 {
-    bool isPane = THIN_WALLED && material.kind == KIND_PANE;
-    Boundary boundary = Boundary(light.at, light.at);
-    if (!isPane) boundary = BoundaryOf(instance, arrival.behind, light.at);
-    if (ABSORPTION && boundary.before.medium != 0) {
-        light.throughput *= Transmittance(materials[boundary.before.medium - 1].absorption, arrival.distance);
-    }
     bool disperses = false;
-    float etaI = IndexOf(boundary.before.medium, D_LINE, disperses);
-    float etaT = isPane ? material.refractionIndex : IndexOf(boundary.beyond.medium, D_LINE, disperses);
+    Crossing crossing = CrossingOf(arrival.found, material, arrival.behind, light.at, D_LINE, disperses);
+    light.throughput *= Absorbed(crossing.boundary.before.medium, arrival.distance);
     vec3 normal = arrival.behind ? -arrival.normal : arrival.normal;
-    Interface crossed = FresnelDielectric(max(dot(-light.direction, normal), LEAST_SLOPE), etaI, etaT);
-    light.throughput *= isPane && !crossed.total ? crossed.transmittance / (1.0 + crossed.reflectance) : crossed.transmittance;
+    Interface crossed = FresnelDielectric(max(dot(-light.direction, normal), LEAST_SLOPE), crossing.etaI, crossing.etaT);
+    light.throughput *= crossing.isPane && !crossed.total ? crossed.transmittance / (1.0 + crossed.reflectance) : crossed.transmittance;
     light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
-    light.at = boundary.beyond;
+    light.at = crossing.boundary.beyond;
     light.origin = LeaveFrom(arrival, light.direction);
     light.left = arrival.found;
 }
 
 void main()
 {
-    ivec2 place = ivec2(gl_GlobalInvocationID.x, gl_GlobalInvocationID.y + firstRow);
+    ivec2 place = ivec2(gl_GlobalInvocationID.x + firstColumn, gl_GlobalInvocationID.y + firstRow);
     if (any(greaterThanEqual(place, imageSize(mean)))) return;
     if (recordsRepeat != 0 && recordCount > recordCapacity) return;
     Sample one = samples[SampleAt(place)];
@@ -143,19 +141,20 @@ void main()
         if (onItsWay) {
             Found found;
             Arrival arrival;
-            bool any = false;
+            bool meets = false;
             if (light.reach == LARGEST_FLOAT || SHADOWS) {
-                any = Trace(light.origin, light.direction, light.left, found);
+                meets = Trace(light.origin, light.direction, light.left, found);
                 ++one.rays;
             }
-            if (any) arrival = ArriveAt(found, light.origin, light.direction);
-            onItsWay = any && arrival.distance < light.reach;
+            if (meets) arrival = ArriveAt(found, light.origin, light.direction);
+            onItsWay = meets && arrival.distance < light.reach;
             if (onItsWay) {
                 Material material = materials[instances[found.instance].material];
-                PassThrough(light, found.instance, material, arrival);
-                onItsWay = material.kind != KIND_OPAQUE && Largest(light.throughput) > LEAST_SHARE && ++passed <= MOST_PASSED;
+                PassThrough(light, material, arrival);
+                onItsWay = material.kind != KIND_OPAQUE && Largest(abs(light.throughput)) > LEAST_SHARE && ++passed <= MOST_PASSED;
             } else {
-                vec3 radiance = light.reach == LARGEST_FLOAT ? SampleEnvironment(light.direction, light.lod) : vec3(1.0);
+                vec3 radiance = light.reach == LARGEST_FLOAT ? SampleEnvironment(light.direction, light.lod)
+                    : Absorbed(light.at.medium, light.reach);
                 one.value.rgb += scale * light.throughput * radiance;
             }
         }

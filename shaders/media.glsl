@@ -116,4 +116,36 @@ Boundary BoundaryOf(uint instance, bool behind, Whereabouts ray)
     return Boundary(Whereabouts(MediumOf(before), before), Whereabouts(MediumOf(beyond), beyond));
 }
 
+// What a ray meets: on which side of it there is which index.
+struct Crossing {
+    Boundary boundary;
+    float etaI;
+    float etaT;
+    bool isOpaque;
+    bool isPane;
+    bool passes;    // nothing is there to see
+};
+
+Crossing CrossingOf(Found found, Material material, bool behind, Whereabouts ray, float wavelength, inout bool disperses)
+{
+    Crossing crossing;
+    crossing.isPane = THIN_WALLED && material.kind == KIND_PANE;
+    crossing.isOpaque = OPAQUE && material.kind == KIND_OPAQUE;
+    crossing.boundary = Boundary(ray, ray);
+    if (!crossing.isOpaque && !crossing.isPane) crossing.boundary = BoundaryOf(found.instance, behind, ray);
+    crossing.etaI = IndexOf(crossing.boundary.before.medium, wavelength, disperses);
+    crossing.etaT = crossing.etaI;
+    if (crossing.isPane) crossing.etaT = material.refractionIndex;
+    else if (!crossing.isOpaque) crossing.etaT = IndexOf(crossing.boundary.beyond.medium, wavelength, disperses);
+    crossing.passes = !crossing.isOpaque && crossing.etaI == crossing.etaT;
+    return crossing;
+}
+
+// What the medium around a ray leaves of its light.
+vec3 Absorbed(uint medium, float distance)
+{
+    if (!ABSORPTION || medium == 0) return vec3(1.0);
+    return Transmittance(materials[medium - 1].absorption, distance);
+}
+
 #endif

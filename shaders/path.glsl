@@ -258,34 +258,25 @@ void main()
         Ray ray = path;
         if (isLight) ray = light;
         Found found = NOWHERE;
-        bool any = Trace(ray.origin, ray.direction, ray.left, found);
+        bool meets = Trace(ray.origin, ray.direction, ray.left, found);
         ++rays;
 
         Arrival arrival;
         Material material = materials[0];
-        if (any) arrival = ArriveAt(found, ray.origin, ray.direction);
-        if (any && isLight) any = arrival.distance < ray.reach;
-        bool isOpaque = false;
-        bool isPane = false;
-        bool passes = false;
+        if (meets) arrival = ArriveAt(found, ray.origin, ray.direction);
+        if (meets && isLight) meets = arrival.distance < ray.reach;
         Boundary boundary = Boundary(ray.at, ray.at);
-        float wavelength = DISPERSION ? spectrum[line].w : D_LINE;
-        float etaI = 1.0;
-        float etaT = 1.0;
+        Crossing crossing = Crossing(boundary, 1.0, 1.0, false, false, false);
         bool disperses = false;
-        if (any) {
+        if (meets) {
             material = materials[instances[found.instance].material];
-            isOpaque = OPAQUE && material.kind == KIND_OPAQUE;
-            isPane = THIN_WALLED && material.kind == KIND_PANE;
-            if (!isOpaque && !isPane) boundary = BoundaryOf(found.instance, arrival.behind, ray.at);
-            if (ABSORPTION && boundary.before.medium != 0) {
-                ray.throughput *= Transmittance(materials[boundary.before.medium - 1].absorption, arrival.distance);
-            }
-            etaI = IndexOf(boundary.before.medium, wavelength, disperses);
-            etaT = isPane ? material.refractionIndex : isOpaque ? etaI : IndexOf(boundary.beyond.medium, wavelength, disperses);
-            passes = !isOpaque && etaI == etaT;
+            crossing = CrossingOf(found, material, arrival.behind, ray.at, DISPERSION ? spectrum[line].w : D_LINE, disperses);
+            boundary = crossing.boundary;
+            ray.throughput *= Absorbed(boundary.before.medium, arrival.distance);
         }
-        bool ends = !any;
+        bool isOpaque = crossing.isOpaque;
+        bool passes = crossing.passes;
+        bool ends = !meets;
         if (passes) {
             ray.at = boundary.beyond;
             ray.reach -= ray.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
@@ -296,10 +287,10 @@ void main()
 
         if (isLight) {
             // Only what is not bent arrives.
-            if (!any) sum += ray.throughput;
+            if (!meets) sum += ray.throughput * (ray.reach < LARGEST_FLOAT ? Absorbed(ray.at.medium, ray.reach) : vec3(1.0));
             toLight = passes && !ends;
             light = ray;
-        } else if (!any) {
+        } else if (!meets) {
             bool isSeen = frame.environmentVisible != 0 || depth > 0;
             if (isSeen) {
                 float weight = 1.0;
@@ -313,11 +304,11 @@ void main()
             path = ray;
             goesOn = !ends;
         } else {
-            if (isOpaque) sum += ray.throughput * material.emission / (etaI * etaI);
+            if (isOpaque) sum += ray.throughput * material.emission / (crossing.etaI * crossing.etaI);
             goesOn = depth < frame.maxDepth;
         }
 
-        bool scatters = !isLight && any && !passes;
+        bool scatters = !isLight && meets && !passes;
         if (scatters && (isOpaque || goesOn)) ++interfaces;
         if (scatters && goesOn) {
             if (DISPERSION && disperses && !isColored) {
@@ -334,12 +325,18 @@ void main()
             vec3 weight = vec3(1.0);
             pdf = NO_PDF;
             bool reflected = false;
-            bool isRough = ROUGHNESS && !isOpaque && !isPane && IsRough(material);
+            bool isRough = ROUGHNESS && !isOpaque && !crossing.isPane && IsRough(material);
             if (isOpaque || isRough) {
                 mat3 toWorld = BasisAround(normal);
-                Met met = MetAt(material, arrival, isOpaque, wi * toWorld, etaI, etaT);
+                Met met = MetAt(material, arrival, isOpaque, wi * toWorld, crossing.etaI, crossing.etaT);
                 toLight = AskLight(met, toWorld, arrival, sequence, pair, ray, light);
-                if (toLight) light.at = dot(light.direction, faceNormal) < 0.0 ? boundary.beyond : boundary.before;
+                if (toLight) {
+                    bool through = dot(light.direction, faceNormal) < 0.0;
+                    light.at = through ? boundary.beyond : boundary.before;
+                    // Light of a point light is given as it is in the medium that it lies in.
+                    float index = through ? crossing.etaT : crossing.etaI;
+                    if (light.reach < LARGEST_FLOAT) light.throughput /= index * index;
+                }
                 Next sampled = SampleNext(met, Point(sequence, pair + PAIR_DIRECTION), choice.x);
                 direction = toWorld * sampled.wo;
                 weight = sampled.weight;
@@ -350,13 +347,13 @@ void main()
                 if (dot(direction, side) < LEAST_SLOPE) pdf = NO_PDF;
                 direction = DirectionAbove(normalize(direction), side);
             } else {
-                Refraction refraction = Refract(wi, normal, etaI, etaT);
+                Refraction refraction = Refract(wi, normal, crossing.etaI, crossing.etaT);
                 float reflectance = refraction.crossed.reflectance;
-                if (isPane && !refraction.crossed.total) reflectance = 2.0 * reflectance / (1.0 + reflectance);
+                if (crossing.isPane && !refraction.crossed.total) reflectance = 2.0 * reflectance / (1.0 + reflectance);
                 reflected = refraction.crossed.total || choice.x < reflectance;
                 if (reflected ? !REFLECTION : !TRANSMISSION) weight = vec3(0.0);
                 if (reflected) direction = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
-                else if (!isPane) direction = DirectionAbove(normalize(refraction.wt), -faceNormal);
+                else if (!crossing.isPane) direction = DirectionAbove(normalize(refraction.wt), -faceNormal);
             }
             path = Ray(LeaveFrom(arrival, direction), direction, ray.throughput * weight, LARGEST_FLOAT,
                 reflected ? boundary.before : boundary.beyond, found, 0);

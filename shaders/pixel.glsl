@@ -9,7 +9,7 @@ layout(set = 0, binding = 15, rgba32f) uniform image2D counts;  // interfaces, r
 
 struct Sample {
     vec4 value;       // radiance, and throughput cut off
-    uint interfaces;
+    float interfaces;  // mean over its trees
     uint rays;
     uint head;        // of its records, from 1; 0: none
     uint disperses;   // 1: its wavelengths have trees of their own
@@ -27,7 +27,7 @@ uint SampleAt(ivec2 place)
 void AddSample(ivec2 place, Sample one)
 {
     vec4 value = one.value;
-    vec4 count = vec4(float(one.interfaces), float(one.rays), 0.0, 0.0);
+    vec4 count = vec4(one.interfaces, float(one.rays), 0.0, 0.0);
     if (sampleIndex != 0) {
         vec4 before = imageLoad(mean, place);
         value = before + (value - before) / float(sampleIndex + 1);

@@ -82,5 +82,6 @@ void main()
     Put(wavelengths);
     Put(footprint);
     Put(samplesInBatch);
+    Put(firstColumn);
     for (int i = 0; i < 4; ++i) Put(spectrum[i]);
 }

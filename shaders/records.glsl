@@ -14,7 +14,7 @@ struct Record {
     uvec4 bodies;
     uint medium;
     uint line;        // wavelength
-    uvec2 footprint;  // of the pixel in a texture's coordinates: half floats, two for each side
+    uvec2 color;      // of the surface, four numbers from 0 to 1 of 16 bits
 };
 
 layout(std430, set = 0, binding = 17) buffer RecordBuffer {

@@ -90,7 +90,8 @@ layout(push_constant) uniform Push {
     uint wavelengths;          // that a sample takes
     float footprint;           // how wide its share of a pixel is, 0 to 1
     uint samplesInBatch;       // that a pixel takes at once
-    uint pushPadding[2];
+    uint firstColumn;          // of those that are traced
+    uint pushPadding;
     vec4 spectrum[4];          // of each its colour, and nanometres
 };
 

@@ -10,6 +10,7 @@ struct Hit {
     vec3 position;
     vec3 normal;    // of unit length, towards the outside of the surface; interpolated where the object is smooth
     bool behind;    // the triangle is seen from the inside
+    vec3 weights;   // of the triangle's corners
 };
 
 vec3 FetchPosition(uint vertex)
@@ -48,11 +49,12 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
     hit.position = hit.t * direction;
     hit.behind = determinant < 0.0;
     vec3 normal = normalize(cross(edge1, edge2));
+    // A pixel's centre may lie just outside of the triangle that the rasteriser chose, where normals go on as they are
+    // inside, and far outside of one seen on edge.
+    float b1 = clamp(dot(fromCorner, p) * inverse, -1.0, 2.0);
+    float b2 = clamp(dot(ray, q) * inverse, -1.0, 2.0);
+    hit.weights = vec3(1.0 - b1 - b2, b1, b2);
     if (instance.smoothNormals != 0) {
-        // A pixel's centre may lie just outside of the triangle that the rasteriser chose, where normals go on as they are
-        // inside, and far outside of one seen on edge.
-        float b1 = clamp(dot(fromCorner, p) * inverse, -1.0, 2.0);
-        float b2 = clamp(dot(ray, q) * inverse, -1.0, 2.0);
         vec3 first = FetchNormal(vertices.x);
         normal = normalize(first + b1 * (FetchNormal(vertices.y) - first) + b2 * (FetchNormal(vertices.z) - first));
     }

@@ -63,11 +63,13 @@ vec3 SampleTexels(Texels image, vec2 uv)
 vec3 SampleTexture(uint number, vec2 uv, mat2 sides)
 {
     Texels image = TexelsOf(number, 0);
+    // Beyond a whole image nothing changes any more.
+    sides = mat2(clamp(sides[0], -64.0, 64.0), clamp(sides[1], -64.0, 64.0));
     mat2 inTexels = mat2(sides[0] * vec2(image.size), sides[1] * vec2(image.size));
-    Row row = RowOver(dot(inTexels[0], inTexels[0]), dot(inTexels[0], inTexels[1]), dot(inTexels[1], inTexels[1]), LONGEST_ROW);
-    float lod = min(row.lod, float(findMSB(max(image.size.x, image.size.y))));
-    int level = int(lod);
-    float coarse = lod - float(level);
+    Row row = RowOver(dot(inTexels[0], inTexels[0]), dot(inTexels[0], inTexels[1]), dot(inTexels[1], inTexels[1]), LONGEST_ROW,
+        float(findMSB(max(image.size.x, image.size.y))));
+    int level = int(row.lod);
+    float coarse = row.lod - float(level);
     image = TexelsOf(number, level);
     Texels next = TexelsOf(number, coarse > 0.0 ? level + 1 : level);
     vec2 axis = sides * row.axis;

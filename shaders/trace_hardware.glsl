@@ -37,11 +37,11 @@ bool Trace(vec3 origin, vec3 direction, Found left, out Found found)
         found.instance = rayQueryGetIntersectionInstanceCustomIndexEXT(query, true);
         found.triangle = rayQueryGetIntersectionPrimitiveIndexEXT(query, true);
         float t = rayQueryGetIntersectionTEXT(query, true);
-        if (found != left && IsAhead(found, origin, direction, t)) break;
-        // The next number, or nearly.
-        start = t * 1.000001;
+        if (found != left && IsAhead(found, origin, direction, t)) return true;
+        // The next number, or nearly, that no device takes for zero.
+        start = max(t * 1.000001, 1.2e-38);
     }
-    return true;
+    return false;
 }
 
 #endif

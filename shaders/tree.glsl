@@ -99,24 +99,46 @@ void Discard(inout Gathered gathered, inout Outlook outlook, vec3 throughput, ve
 // ---- opaque surfaces -----------------------------------------------------------------------------------------------------------
 
 // What a mirror-like surface mirrors, of each channel; 0 where it is none.
-vec3 MirroredShare(Material material, Arrival arrival, mat2 sides, vec3 wi, vec3 normal)
+vec3 MirroredShare(Material material, vec3 color, vec3 wi, vec3 normal)
 {
-    vec3 color = BaseColor(material, arrival.found, arrival.weights, sides);
     OpaqueSurface surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
     return IsSpecular(surface) && IsMirror(surface) ? FacetReflectance(surface, dot(wi, normal)) : vec3(0.0);
 }
 
+// Records of a pixel that wait for their lights, the last one first, from 1; and those of a tree that begins once more.
+struct Chain {
+    uint head;
+    uint spare;
+};
+
 // Leaves it to lights.glsl what else an opaque surface does with the light that reaches it.
-void Leave(inout uint head, inout Gathered gathered, Found found, Branch branch, uint line, mat2 sides)
+void Leave(inout Chain chain, inout Gathered gathered, Found found, Branch branch, uint line, vec3 color)
 {
-    uint number = atomicAdd(recordCount, 1);
-    if (number >= recordCapacity) {
-        gathered.discarded += Largest(branch.throughput);
-        return;
+    uint number = chain.spare;
+    if (number != 0) {
+        chain.spare = records[number - 1].next;
+    } else {
+        number = atomicAdd(recordCount, 1) + 1;
+        if (number > recordCapacity) {
+            gathered.discarded += Largest(branch.throughput);
+            return;
+        }
     }
-    records[number] = Record(branch.origin, head, branch.direction, found.instance, branch.throughput, found.triangle, branch.at.bodies.ranks,
-        branch.at.medium, line, uvec2(packHalf2x16(sides[0]), packHalf2x16(sides[1])));
-    head = number + 1;
+    uvec2 packed = uvec2(packUnorm2x16(color.rg), packUnorm2x16(vec2(color.b, 0.0)));
+    records[number - 1] = Record(branch.origin, chain.head, branch.direction, found.instance, branch.throughput, found.triangle,
+        branch.at.bodies.ranks, branch.at.medium, line, packed);
+    chain.head = number;
+}
+
+// Gives the records back that were left after `head` was the last one.
+void GiveBack(inout Chain chain, uint head)
+{
+    while (chain.head != head) {
+        uint number = chain.head;
+        chain.head = records[number - 1].next;
+        records[number - 1].next = chain.spare;
+        chain.spare = number;
+    }
 }
 
 // ---- pixels --------------------------------------------------------------------------------------------------------------------
@@ -139,7 +161,8 @@ void main()
     bool disperses = false;
     vec3 radiance = vec3(0.0);
     vec3 discarded = vec3(0.0);
-    float tolerance = frame.tolerance;
+    float scale = frame.cameraIndex * frame.cameraIndex;
+    float tolerance = frame.tolerance / scale;
     if (DISPERSION) {
         vec3 shares = vec3(0.0);
         for (uint i = 0; i < wavelengths; ++i) shares += max(spectrum[i].rgb, 0.0);
@@ -153,20 +176,21 @@ void main()
     Branch waiting[TREE_STACK];
     int top = 0;
     uint passed = 0;
-    uint head = 0;              // of the records that wait for their lights
-    uint headBefore = 0;        // the same when the tree began: there it begins once more
+    Chain chain = Chain(0, 0);
+    uint headBefore = 0;        // of the chain when the tree began: there it begins once more
     uint interfacesBefore = 0;
 
     for (;;) {
         if (next == NEXT_PIXEL) {
             if (++column == PIXELS) break;
-            place = ivec2(8 * (PIXELS * gl_WorkGroupID.x + column) + gl_LocalInvocationID.x, gl_GlobalInvocationID.y + firstRow);
+            place = ivec2(firstColumn + 8 * (PIXELS * gl_WorkGroupID.x + column) + gl_LocalInvocationID.x, gl_GlobalInvocationID.y + firstRow);
             if (any(greaterThanEqual(place, imageSize(mean)))) continue;
             interfaces = rays = line = 0;
             disperses = false;
             radiance = discarded = vec3(0.0);
             cutoff = frame.cutoff;
-            head = headBefore = interfacesBefore = 0;
+            chain = Chain(0, 0);
+            headBefore = interfacesBefore = 0;
             next = NEXT_TREE;
         }
         if (next == NEXT_TREE) {
@@ -174,34 +198,30 @@ void main()
             branch = CameraBranch(vec2(place) + 0.5 + jitter);
             top = 0;
             passed = 0;
-            head = headBefore;
+            if (OPAQUE) GiveBack(chain, headBefore);
             interfaces = interfacesBefore;
             next = NEXT_BRANCH;
         }
         Found found;
         vec3 direction = branch.direction;
-        bool any = Trace(branch.origin, direction, branch.left, found);
+        bool meets = Trace(branch.origin, direction, branch.left, found);
         ++rays;
 
         Look nowhere = Look(vec3(0.0), direction, mat2x3(0.0));
         Outlook outlook = Outlook(nowhere, nowhere, 0);
         bool goesOn = false;
-        if (!any) {
+        if (!meets) {
             if (frame.environmentVisible != 0 || branch.depth > 0) LookTowards(outlook, branch.throughput, direction, branch.differentials.direction);
         } else {
             Arrival arrival = ArriveAt(found, branch.origin, direction);
             Material material = materials[instances[found.instance].material];
-            bool isPane = THIN_WALLED && material.kind == KIND_PANE;
-            bool isOpaque = OPAQUE && material.kind == KIND_OPAQUE;
-            Boundary boundary = Boundary(branch.at, branch.at);
-            if (!isOpaque && !isPane) boundary = BoundaryOf(found.instance, arrival.behind, branch.at);
-            if (ABSORPTION && boundary.before.medium != 0) {
-                branch.throughput *= Transmittance(materials[boundary.before.medium - 1].absorption, arrival.distance);
-            }
             float wavelength = DISPERSION ? spectrum[line].w : D_LINE;
-            float etaI = IndexOf(boundary.before.medium, wavelength, disperses);
-            float etaT = isPane ? material.refractionIndex : IndexOf(boundary.beyond.medium, wavelength, disperses);
-            bool passes = !isOpaque && etaI == etaT; // nothing is there to see
+            Crossing crossing = CrossingOf(found, material, arrival.behind, branch.at, wavelength, disperses);
+            Boundary boundary = crossing.boundary;
+            bool isOpaque = crossing.isOpaque;
+            bool isPane = crossing.isPane;
+            bool passes = crossing.passes;
+            branch.throughput *= Absorbed(boundary.before.medium, arrival.distance);
 
             vec3 wi = -direction;
             vec3 faceNormal = arrival.behind ? -arrival.faceNormal : arrival.faceNormal;
@@ -209,14 +229,19 @@ void main()
             Differentials before = branch.differentials;
             mat2x3 normals = mat2x3(0.0);
             if (FOOTPRINTS) {
-                before = branch.differentials = Transferred(before, direction, arrival);
-                if (!passes) normals = NormalDifferentials(arrival, normal, before.position);
+                if (passes) {
+                    before.position += arrival.distance * before.direction;
+                } else {
+                    before = Transferred(before, direction, arrival);
+                    normals = NormalDifferentials(arrival, normal, before.position);
+                }
+                branch.differentials = before;
             }
             Refraction refraction = Refraction(vec3(0.0), Interface(0.0, 1.0, 1.0, false));
             float reflectance = 0.0;
             float transmittance = 1.0;
             if (!isOpaque && !passes) {
-                refraction = Refract(wi, normal, etaI, etaT);
+                refraction = Refract(wi, normal, crossing.etaI, crossing.etaT);
                 reflectance = refraction.crossed.reflectance;
                 transmittance = refraction.crossed.transmittance;
                 if (isPane) {
@@ -229,20 +254,21 @@ void main()
             if (isOpaque) {
                 ++interfaces;
                 // Light is given as it is in the medium that the surface lies in.
-                float index = IndexOf(branch.at.medium, wavelength, disperses);
-                gathered.radiance += branch.throughput * material.emission / (index * index);
+                gathered.radiance += branch.throughput * material.emission / (crossing.etaI * crossing.etaI);
                 mat2 sides = mat2(0.0);
                 if (TEXTURES && FOOTPRINTS) {
                     mat3x2 corners = CoordinatesOf(VerticesOf(found));
                     sides = mat2(corners[1] - corners[0], corners[2] - corners[0]) * WeightDifferentials(arrival, before.position);
                 }
-                Leave(head, gathered, found, branch, line, sides);
-                branch.throughput *= MirroredShare(material, arrival, sides, wi, normal);
+                vec3 color = BaseColor(material, found, arrival.weights, sides);
+                Leave(chain, gathered, found, branch, line, color);
+                branch.throughput *= MirroredShare(material, color, wi, normal);
                 if (Largest(branch.throughput) > 0.0) {
                     vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
                     Differentials reflected = before;
                     if (FOOTPRINTS) reflected = Reflected(before, direction, normal, normals);
                     goesOn = branch.depth < frame.maxDepth && Largest(branch.throughput) > cutoff;
+                    if (!goesOn && branch.depth < frame.maxDepth) gathered.faint += Largest(branch.throughput);
                     if (goesOn) branch = Child(branch, arrival, wr, reflected, 1.0, branch.at);
                     else Discard(gathered, outlook, branch.throughput, wr, reflected);
                 }
@@ -265,7 +291,7 @@ void main()
                     Differentials refracted = before;
                     if (FOOTPRINTS) {
                         reflected = Reflected(before, direction, normal, normals);
-                        if (!isPane) refracted = Refracted(before, direction, normal, normals, wt, etaI / etaT);
+                        if (!isPane) refracted = Refracted(before, direction, normal, normals, wt, crossing.etaI / crossing.etaT);
                     }
                     if (!REFLECTION) reflectance = 0.0;
                     if (!TRANSMISSION) transmittance = 0.0;
@@ -324,14 +350,15 @@ void main()
         } else {
             vec3 weight = DISPERSION && disperses ? spectrum[line].rgb : vec3(1.0);
             radiance += weight * gathered.radiance;
-            discarded += weight * gathered.discarded;
+            // Lines of a colour below 0 take light away: what they lack is not lacking in the picture.
+            discarded += max(weight, 0.0) * gathered.discarded;
             next = NEXT_TREE;
             cutoff = frame.cutoff;
-            headBefore = head;
+            headBefore = chain.head;
             interfacesBefore = interfaces;
             if (!DISPERSION || !disperses || ++line == wavelengths) {
-                float scale = frame.cameraIndex * frame.cameraIndex;
-                Sample one = Sample(scale * vec4(radiance, Largest(discarded)), interfaces, rays, head, uint(disperses));
+                float trees = DISPERSION && disperses ? float(wavelengths) : 1.0;
+                Sample one = Sample(scale * vec4(radiance, Largest(discarded)), float(interfaces) / trees, rays, chain.head, uint(disperses));
                 if (OPAQUE) samples[SampleAt(place)] = one; else AddSample(place, one);
                 next = NEXT_PIXEL;
             }

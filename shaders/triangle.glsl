@@ -48,8 +48,8 @@ bool IsPlaneAhead(vec3 direction, vec3 a, vec3 b, vec3 c)
     return (dot(a, normal) > 0.0) == (dot(direction, normal) > 0.0);
 }
 
-// Whether the ray passes through the triangle.
-bool MeetTriangle(ShearedRay ray, vec3 a, vec3 b, vec3 c, out Meeting meeting)
+// The corners as the ray sees them, and the areas of the parts of the triangle that its edges make with it: of one sign inside.
+vec3 AreasSeenBy(ShearedRay ray, inout vec3 a, inout vec3 b, inout vec3 c)
 {
     a = Permute(a - ray.origin, ray.axis);
     b = Permute(b - ray.origin, ray.axis);
@@ -60,13 +60,28 @@ bool MeetTriangle(ShearedRay ray, vec3 a, vec3 b, vec3 c, out Meeting meeting)
     precise float by = b.y - ray.shear.y * b.z;
     precise float cx = c.x - ray.shear.x * c.z;
     precise float cy = c.y - ray.shear.y * c.z;
-    precise float u = cx * by - cy * bx;
-    precise float v = ax * cy - ay * cx;
-    precise float w = bx * ay - by * ax;
-    if (min(min(u, v), w) < 0.0 && max(max(u, v), w) > 0.0) return false;
-    float determinant = u + v + w;
+    precise vec3 areas = vec3(cx * by - cy * bx, ax * cy - ay * cx, bx * ay - by * ax);
+    return areas;
+}
+
+// Where a ray that passes by a triangle comes closest to it, nearly.
+Meeting MeetingAtEdge(ShearedRay ray, vec3 a, vec3 b, vec3 c)
+{
+    vec3 areas = AreasSeenBy(ray, a, b, c);
+    bool behind = (areas.x + areas.y + areas.z < 0.0) != (ray.shear.z < 0.0);
+    areas = max(areas.x + areas.y + areas.z < 0.0 ? -areas : areas, vec3(0.0));
+    float sum = areas.x + areas.y + areas.z;
+    return Meeting(0.0, sum > 0.0 ? areas / sum : vec3(1.0 / 3.0), behind);
+}
+
+// Whether the ray passes through the triangle.
+bool MeetTriangle(ShearedRay ray, vec3 a, vec3 b, vec3 c, out Meeting meeting)
+{
+    vec3 areas = AreasSeenBy(ray, a, b, c);
+    if (min(min(areas.x, areas.y), areas.z) < 0.0 && max(max(areas.x, areas.y), areas.z) > 0.0) return false;
+    float determinant = areas.x + areas.y + areas.z;
     if (determinant == 0.0) return false;
-    meeting.weights = vec3(u, v, w) / determinant;
+    meeting.weights = areas / determinant;
     meeting.t = dot(meeting.weights, vec3(a.z, b.z, c.z)) * ray.shear.z;
     meeting.behind = (determinant < 0.0) != (ray.shear.z < 0.0);
     if (abs(meeting.t) > DOUBT * max(max(abs(a.z), abs(b.z)), abs(c.z)) * abs(ray.shear.z)) return meeting.t > 0.0;

@@ -6,7 +6,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::options::Model;
-use crate::scene::{Dielectric, Material, Scene, Surface};
+use crate::scene::{Dielectric, Material, Object, Scene, Surface};
 
 /// A row of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -108,12 +108,12 @@ fn disperses(dielectric: &Dielectric) -> bool {
 
 /// Bounding boxes that meet may hold bodies that meet, and a camera in one may be inside the body.
 fn nests(scene: &Scene) -> bool {
-    let boxes: Vec<_> = scene
-        .objects
-        .iter()
-        .filter(|object| matches!(scene.materials[object.material].surface, Surface::Dielectric(_)))
-        .map(|object| scene.bounds_of(object))
-        .collect();
+    let is_dielectric = |object: &&Object| matches!(scene.materials[object.material].surface, Surface::Dielectric(_));
+    if scene.objects.iter().filter(is_dielectric).any(|object| scene.meshes[object.mesh].overlaps) {
+        return true;
+    }
+    let boxes: Vec<_> =
+        scene.objects.iter().filter(is_dielectric).map(|object| scene.bounds_of(object)).collect();
     boxes
         .iter()
         .enumerate()

@@ -123,7 +123,8 @@ impl Records {
                 wavelengths: n.next() as u32,
                 footprint: n.next(),
                 samples_in_batch: n.next() as u32,
-                padding: [0; 2],
+                first_column: n.next() as u32,
+                padding: 0,
                 spectrum: std::array::from_fn(|_| std::array::from_fn(|_| n.next())),
             },
         };

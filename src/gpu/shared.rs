@@ -133,6 +133,7 @@ pub struct SamplePush {
     pub wavelengths: u32,
     pub footprint: f32,
     pub samples_in_batch: u32,
-    pub padding: [u32; 2],
+    pub first_column: u32,
+    pub padding: u32,
     pub spectrum: [[f32; 4]; 4],
 }

@@ -4,7 +4,7 @@ use super::geometry::Draw;
 use super::resources::Resources;
 use super::view;
 use crate::gpu::{
-    Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
+    BindGroup, Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
     SamplePush, Target, Use, shaders,
 };
 use crate::options::Size;
@@ -27,24 +27,29 @@ pub struct Aovs {
 
 pub(super) struct AovPass {
     pipeline: GraphicsPipeline,
+    /// The scene with its images, of models that trace.
+    traced: Option<BindGroup>,
 }
 
 impl AovPass {
     pub(super) fn new(gpu: &Gpu, resources: &Resources) -> Result<Self> {
+        let traced = (!resources.traced.is_empty())
+            .then(|| BindGroup::new(gpu, "scene with images", resources.traced.clone()))
+            .transpose()?;
         let pipeline = GraphicsPipeline::new(
             gpu,
             &GraphicsPipelineDesc {
                 name: "aov",
                 vertex: &shaders::FORWARD_VERT,
-                fragment: &shaders::AOV_FRAG,
-                group: &resources.group,
+                fragment: if traced.is_some() { &shaders::AOV_TEXTURED_FRAG } else { &shaders::AOV_FRAG },
+                group: traced.as_ref().unwrap_or(&resources.group),
                 push_bytes: size_of::<SamplePush>() as u32,
                 colors: &[VALUES, VALUES],
                 depth: Depth::Nearest,
                 specialization: &resources.specialization,
             },
         )?;
-        Ok(Self { pipeline })
+        Ok(Self { pipeline, traced })
     }
 
     pub(super) fn run(
@@ -68,7 +73,7 @@ impl AovPass {
             cmd.timed("aov", |cmd| {
                 let colors = [Target { image: &normal_depth, clear }, Target { image: &object, clear }];
                 cmd.render(&colors, Some(Target { image: &depth, clear }), |pass| {
-                    pass.bind(&self.pipeline, &resources.group);
+                    pass.bind(&self.pipeline, self.traced.as_ref().unwrap_or(&resources.group));
                     for (instance_index, draw) in (0..).zip(draws) {
                         pass.draw(&SamplePush { instance_index, ..push }, draw.vertices, draw.sides);
                     }

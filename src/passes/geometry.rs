@@ -17,7 +17,7 @@ pub(super) struct Draw {
     pub(super) sides: Sides,
 }
 
-/// Every mesh once, and its instances. `single` draws dielectrics alone; models that trace see every object.
+/// Every mesh once, and the instances that a model sees.
 #[derive(Default)]
 pub(super) struct Geometry {
     pub(super) positions: Vec<f32>,
@@ -51,9 +51,10 @@ struct Place {
 }
 
 impl Geometry {
-    pub(super) fn new(scene: &Scene, view: &View, trace: Option<Trace>) -> Self {
+    /// `opaque`: whether objects are seen that are no dielectrics.
+    pub(super) fn new(scene: &Scene, view: &View, trace: Option<Trace>, opaque: bool) -> Self {
         let mut all = Self::default();
-        let is_seen = |object: &Object| trace.is_some() || is_dielectric(scene, object);
+        let is_seen = |object: &Object| opaque || is_dielectric(scene, object);
         let mut objects: Vec<usize> =
             (0..scene.objects.len()).filter(|&number| is_seen(&scene.objects[number])).collect();
         let to_device =

@@ -81,3 +81,15 @@ impl Path {
         Ok(times)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_shader_has_the_same_sizes() {
+        let shader = include_str!("../../shaders/path.glsl");
+        assert!(shader.contains(&format!("const int PIXELS = {PIXELS};")));
+        assert!(shader.contains(&format!("layout(local_size_x = {GROUP}, local_size_y = {GROUP}) in;")));
+    }
+}

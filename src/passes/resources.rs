@@ -55,7 +55,8 @@ impl Resources {
     pub(super) fn new(commands: &mut Commands, scene: &Scene, plan: &Plan, trace: Option<Trace>) -> Result<Self> {
         let view = View::new(&scene.camera, scene.bounds(), plan.size);
         let start = Instant::now();
-        let geometry = Geometry::new(scene, &view, trace);
+        let opaque = trace.is_some() && plan.effects.contains(Effect::Opaque);
+        let geometry = Geometry::new(scene, &view, trace, opaque);
         let mut acceleration = start.elapsed();
         if geometry.depth > TRACE_STACK {
             return Err(GpuError::TooLarge {
@@ -144,7 +145,7 @@ impl Resources {
                 .with(ENVIRONMENT_IMAGE, is_image)
                 .with(FOOTPRINTS, footprints),
             metres_per_unit: 1.0 / view.units_per_metre,
-            opaque: trace.is_some() && plan.effects.contains(Effect::Opaque),
+            opaque,
             acceleration: trace.map(|_| acceleration),
         })
     }
@@ -416,5 +417,20 @@ fn pack(texels: &[[f32; 3]], half: bool) -> Vec<u8> {
             .collect()
     } else {
         texels.iter().flat_map(|&[r, g, b]| bytemuck::cast::<_, [u8; 16]>([r, g, b, 1.0])).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shaders_have_the_same_constants() {
+        let environment = include_str!("../../shaders/environment.glsl");
+        assert!(environment.contains(&format!("(constant_id = {ENVIRONMENT_IMAGE}) const bool ENVIRONMENT_IMAGE")));
+        let footprint = include_str!("../../shaders/footprint.glsl");
+        assert!(footprint.contains(&format!("(constant_id = {FOOTPRINTS}) const bool FOOTPRINTS")));
+        let trace = include_str!("../../shaders/trace_software.glsl");
+        assert!(trace.contains(&format!("const int TRACE_STACK = {TRACE_STACK};")));
     }
 }

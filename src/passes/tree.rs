@@ -16,6 +16,9 @@ use crate::options::Trace;
 /// Pixels of a row that one invocation takes: `PIXELS` of `shaders/tree.glsl`.
 const PIXELS: u32 = 8;
 
+/// Pixels of a row of a workgroup.
+const COLUMNS: u32 = GROUP * PIXELS;
+
 /// Pixels of a slice, where their samples wait for light.
 const MOST_SAMPLES: u32 = 1 << 19;
 
@@ -31,6 +34,8 @@ pub(super) struct Tree {
     pipeline: ComputePipeline,
     lights: Option<Lights>,
     slices: Slices,
+    /// Pixels of a slice that is as low as it can be.
+    columns: u32,
 }
 
 /// What lights opaque surfaces.
@@ -109,10 +114,10 @@ impl Tree {
                 )?,
             }),
         };
-        Ok(Self { pipeline: pipeline(tree)?, lights, slices: Slices::new() })
+        Ok(Self { pipeline: pipeline(tree)?, lights, slices: Slices::new(), columns: u32::MAX })
     }
 
-    /// One sample of every pixel, in slices of rows.
+    /// One sample of every pixel, in slices of rows; where those leave more points than there is room for, in parts of rows.
     pub(super) fn sample(
         &mut self,
         commands: &mut Commands,
@@ -123,35 +128,44 @@ impl Tree {
         let (width, height) = (targets.mean.width(), targets.mean.height());
         let most_rows = (MOST_SAMPLES / width / GROUP).max(1) * GROUP;
         let mut times = Vec::new();
-        let mut first_row = 0;
+        let (mut first_row, mut first_column) = (0, 0);
         while first_row < height {
-            let rows = self.slices.next((height - first_row).min(most_rows));
-            let push = SamplePush { first_row, ..push };
+            let rows = if first_column == 0 { self.slices.next((height - first_row).min(most_rows)) } else { GROUP };
+            let columns = if rows > GROUP { width } else { self.columns.min(width - first_column) };
+            let push = SamplePush { first_row, first_column, ..push };
             let start = Instant::now();
             times.extend(commands.run(|cmd| {
                 cmd.use_image(&targets.mean, Use::Storage);
                 cmd.use_image(&tree.counts, Use::Storage);
                 if let Some(lights) = &self.lights {
-                    let header = if rows > GROUP { &lights.repeatable } else { &lights.last };
+                    let header = if columns > COLUMNS { &lights.repeatable } else { &lights.last };
                     cmd.copy_buffer(header, &tree.pending.records);
                 }
                 cmd.timed("tree", |cmd| {
-                    cmd.dispatch(&self.pipeline, &tree.group, &push, [width.div_ceil(GROUP * PIXELS), rows / GROUP, 1]);
+                    cmd.dispatch(&self.pipeline, &tree.group, &push, [columns.div_ceil(COLUMNS), rows / GROUP, 1]);
                 });
                 if let Some(lights) = &self.lights {
                     cmd.wait_for_buffers();
                     cmd.timed("lights", |cmd| {
-                        cmd.dispatch(&lights.pipeline, &tree.group, &push, [width.div_ceil(GROUP), rows / GROUP, 1]);
+                        let groups = [columns.div_ceil(GROUP), rows / GROUP, 1];
+                        cmd.dispatch(&lights.pipeline, &tree.group, &push, groups);
                     });
                     cmd.copy_buffer(&tree.pending.records, &lights.header);
                 }
             })?);
-            if rows > GROUP && self.lights.as_ref().is_some_and(Lights::lost_records) {
-                self.slices.halve(rows);
+            if columns > COLUMNS && self.lights.as_ref().is_some_and(Lights::lost_records) {
+                if rows > GROUP {
+                    self.slices.halve(rows);
+                } else {
+                    self.columns = (columns / 2).next_multiple_of(COLUMNS);
+                }
                 continue;
             }
-            first_row += rows;
-            self.slices.took(rows, start.elapsed(), height);
+            first_column += columns;
+            if first_column >= width {
+                (first_row, first_column) = (first_row + rows, 0);
+                self.slices.took(rows, start.elapsed(), height);
+            }
         }
         Ok(times)
     }
@@ -162,5 +176,31 @@ impl Lights {
     fn lost_records(&self) -> bool {
         let found: Option<&[u8; 4]> = self.header.bytes().first_chunk();
         found.is_some_and(|&count| u32::from_ne_bytes(count) > MOST_RECORDS)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn shaders_have_the_same_sizes() {
+        let shader = include_str!("../../shaders/tree.glsl");
+        assert!(shader.contains(&format!("const int PIXELS = {PIXELS};")));
+        assert!(shader.contains(&format!("layout(local_size_x = {GROUP}, local_size_y = {GROUP}) in;")));
+        let words = |text: &str, name: &str| {
+            let body = text.split(&format!("struct {name} {{")).nth(1).and_then(|rest| rest.split("};").next());
+            let lines = body.expect("a struct").lines().filter_map(|line| line.split_whitespace().next());
+            let size = |kind: &str| match kind {
+                "float" | "uint" => 1,
+                "uvec2" => 2,
+                "vec3" => 3,
+                "vec4" | "uvec4" => 4,
+                other => panic!("{other}"),
+            };
+            lines.map(size).sum::<u64>()
+        };
+        assert_eq!(4 * words(include_str!("../../shaders/pixel.glsl"), "Sample"), SAMPLE_BYTES);
+        assert_eq!(4 * words(include_str!("../../shaders/records.glsl"), "Record"), RECORD_BYTES);
     }
 }

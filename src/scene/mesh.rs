@@ -8,7 +8,8 @@ use std::fmt;
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::{Bounds, topology};
+use super::topology::{self, Topology};
+use super::Bounds;
 
 /// The farthest a vertex, light or camera may lie from the origin. The renderer's 32-bit arithmetic squares areas:
 /// (1e9)^4 = 1e36 is still finite.
@@ -31,6 +32,8 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// What was wrong.
     pub faults: MeshFaults,
+    /// Whether it may hold bodies that overlap.
+    pub overlaps: bool,
 }
 
 /// A mesh as a file holds it, nothing of it checked.
@@ -175,7 +178,7 @@ impl Mesh {
         if let Some(first) = triangles.iter().position(bad) {
             return Err(Refusal::BadIndices { count: triangles.iter().filter(|t| bad(t)).count(), first, vertices });
         }
-        let turned = topology::analyse(&positions, &triangles, &mut faults);
+        let Topology { inverted: turned, overlaps } = topology::analyse(&positions, &triangles, &mut faults);
         let mut inverted = vec![false; if turned.is_empty() { 0 } else { vertices }];
         for number in turned {
             let triangle = &mut triangles[number as usize];
@@ -192,7 +195,7 @@ impl Mesh {
         let mut used = vec![false; vertices];
         triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
         faults.unused_vertices = used.iter().filter(|used| !**used).count();
-        let mut mesh = Self { name, positions, normals, uvs, triangles, faults };
+        let mut mesh = Self { name, positions, normals, uvs, triangles, faults, overlaps };
         if mesh.normals.len() != vertices {
             mesh.normals.clear();
         }

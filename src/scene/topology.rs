@@ -25,9 +25,16 @@ struct Shell {
     volume: f64,
 }
 
-/// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`. Returns the triangles of the inverted
-/// shells, by their numbers.
-pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Vec<u32> {
+/// What is known of a surface beyond its faults.
+pub struct Topology {
+    /// Triangles of inverted shells, by their numbers.
+    pub inverted: Vec<u32>,
+    /// Whether two of its bodies may overlap: their bounding boxes do.
+    pub overlaps: bool,
+}
+
+/// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`.
+pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Topology {
     let welded = weld(positions);
     // A triangle that welding folds up has edges that cancel out.
     let (numbers, triangles): (Vec<u32>, Vec<[u32; 3]>) = (0..)
@@ -39,7 +46,18 @@ pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut Mesh
     let shells = shells(positions, &numbers, triangles, &faulty);
     let inverted = inverted_shells(&shells, positions);
     faults.inverted_shells = inverted.len();
-    inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect()
+    Topology {
+        overlaps: overlaps(&shells, &inverted),
+        inverted: inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect(),
+    }
+}
+
+/// Whether the boxes of two shells meet that both are bodies and no cavities; yes where they are too many to tell.
+fn overlaps(shells: &[Shell], inverted: &[&Shell]) -> bool {
+    let is_body = |shell: &&Shell| (shell.volume > 0.0) != inverted.iter().any(|other| std::ptr::eq(*other, *shell));
+    let bodies: Vec<_> = shells.iter().filter(is_body).collect();
+    bodies.len() * bodies.len() > MOST_PAIRS
+        || bodies.iter().enumerate().any(|(i, a)| bodies[i + 1..].iter().any(|b| a.bounds.intersects(&b.bounds)))
 }
 
 /// For each vertex the first one, in the order of their bits, at the same place.
