@@ -12,6 +12,7 @@ mod footprints;
 mod furnace;
 mod limits;
 mod media;
+mod opaque;
 mod referee;
 mod referee_gpu;
 mod reference;
