@@ -29,7 +29,7 @@ layout(local_size_x = 8, local_size_y = 8) in;
 // Pixels in a row of a workgroup's that one invocation takes, one after the other; as in src/passes/tree.rs.
 const int PIXELS = 8;
 
-// Branches that wait. Each has at least twice the throughput of the next.
+// Branches that wait. Whenever one is added, the one that goes on has at most half its throughput.
 const int TREE_STACK = 16;
 
 // A tree that cut off more than it may is followed once more with a cut-off so many times smaller, down to what no image shows.

@@ -26,6 +26,8 @@ pub struct Plan {
     pub tolerance: f64,
     /// Whether environment and textures are averaged over a sample's share of its pixel, where rays are traced.
     pub footprints: bool,
+    /// How `path` looks for the light of the environment.
+    pub estimator: Estimator,
     /// How rays are traced, where the user has a wish.
     pub trace: Option<Trace>,
     /// Seed of everything random.
@@ -46,6 +48,18 @@ pub struct Plan {
     pub debug: DebugControls,
     /// Every option that was given, and the defaults of those that shape each picture.
     pub options: RenderArgs,
+}
+
+/// How directions to the environment are chosen at surfaces that spread light. All estimate the same.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Estimator {
+    /// Where it is bright, and where the surface sends light: multiple importance sampling.
+    #[default]
+    Both,
+    /// Where it is bright.
+    Lights,
+    /// Where the surface sends light.
+    Surfaces,
 }
 
 /// How much is spent.
@@ -162,6 +176,7 @@ impl Plan {
             cutoff: args.tolerance.map_or(CUTOFF, |tolerance| tolerance / 4.0),
             tolerance: args.tolerance.unwrap_or(f64::INFINITY),
             footprints: model == Model::Tree,
+            estimator: Estimator::default(),
             trace: args.trace,
             seed: args.seed.unwrap_or(0),
             effects: share(true),

@@ -19,13 +19,17 @@ use crate::optics::compensation::AlbedoTable;
 use crate::optics::medium::absorption;
 use crate::optics::rough::RoughInterface;
 use crate::options::{Model, Trace};
-use crate::plan::{Budget, Plan};
+use crate::plan::{Budget, Estimator, Plan};
 use crate::scene::{
     Dielectric, Dispersion, Material, Opaque, Panorama, Scene, Sellmeier, Surface, Surroundings, Texels, Texture,
 };
 
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
+
+/// The ids of the same names in `shaders/path.glsl`.
+const SAMPLE_LIGHTS: u32 = 66;
+const SAMPLE_SURFACES: u32 = 67;
 
 /// The id of `FOOTPRINTS` in `shaders/footprint.glsl`.
 const FOOTPRINTS: u32 = 65;
@@ -143,7 +147,9 @@ impl Resources {
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)
-                .with(FOOTPRINTS, footprints),
+                .with(FOOTPRINTS, footprints)
+                .with(SAMPLE_LIGHTS, plan.estimator != Estimator::Surfaces)
+                .with(SAMPLE_SURFACES, plan.estimator != Estimator::Lights),
             metres_per_unit: 1.0 / view.units_per_metre,
             opaque,
             acceleration: trace.map(|_| acceleration),
@@ -430,6 +436,9 @@ mod tests {
         assert!(environment.contains(&format!("(constant_id = {ENVIRONMENT_IMAGE}) const bool ENVIRONMENT_IMAGE")));
         let footprint = include_str!("../../shaders/footprint.glsl");
         assert!(footprint.contains(&format!("(constant_id = {FOOTPRINTS}) const bool FOOTPRINTS")));
+        let path = include_str!("../../shaders/path.glsl");
+        assert!(path.contains(&format!("(constant_id = {SAMPLE_LIGHTS}) const bool SAMPLE_LIGHTS")));
+        assert!(path.contains(&format!("(constant_id = {SAMPLE_SURFACES}) const bool SAMPLE_SURFACES")));
         let trace = include_str!("../../shaders/trace_software.glsl");
         assert!(trace.contains(&format!("const int TRACE_STACK = {TRACE_STACK};")));
     }

@@ -1,0 +1,67 @@
+//! Under white light everything is white.
+
+use glam::DVec3;
+
+use vitrum::scene::{Dielectric, Opaque, Surface};
+
+use crate::bodies::{self, in_white};
+use crate::common::Validated;
+use crate::device::{Shot, picture};
+use crate::shapes::{Part, glass, icosphere, scene};
+
+/// Smooth glass sends on whatever it meets: each path is worth 1, or 0 where it was too long.
+#[test]
+fn smooth_bodies_are_white_to_the_bit() {
+    let Some(validated) = Validated::open() else { return };
+    for (name, scene) in bodies::all() {
+        let found = picture(&validated, &in_white(scene), Shot { samples: 32, depth: 256, ..Shot::default() });
+        let above = found.radiance.iter().filter(|value| value.max_element() > 1.0 + 1e-6).count();
+        let lost = 1.0 - found.mean().min_element();
+        println!("{name}: {lost:.1e} is lost to the depth");
+        assert_eq!(above, 0, "{name}: pixels above 1");
+        assert!(lost < 0.01, "{name}: {lost}");
+    }
+    validated.verdict();
+}
+
+/// What facets lose is given back: 1 within a per cent, whatever roughness and index.
+#[test]
+fn rough_bodies_are_white() {
+    let Some(validated) = Validated::open() else { return };
+    for ior in [1.1, 1.5, 2.42] {
+        for roughness in [0.1_f64, 0.3, 0.6, 1.0] {
+            let frosted = Dielectric { roughness, ..glass(ior) };
+            let scene = in_white(scene([Part::of(icosphere(5), Surface::Dielectric(frosted))]));
+            let found = picture(&validated, &scene, Shot { depth: 1024, samples: 64, ..Shot::default() });
+            let body: Vec<DVec3> = found
+                .radiance
+                .iter()
+                .zip(&found.interfaces)
+                .filter(|&(_, interfaces)| *interfaces > 0.5)
+                .map(|(value, _)| *value)
+                .collect();
+            let mean = body.iter().sum::<DVec3>().x / body.len() as f64;
+            println!("index {ior}, roughness {roughness}: {mean:.4}");
+            assert!((mean - 1.0).abs() < 0.02, "index {ior}, roughness {roughness}: {mean}");
+        }
+    }
+    validated.verdict();
+}
+
+/// A Lambertian body reflects its share; a white one of any roughness never more than there is.
+#[test]
+fn opaque_bodies_reflect_their_share() {
+    let Some(validated) = Validated::open() else { return };
+    let color = DVec3::new(0.8, 0.5, 0.2);
+    let matte = Opaque { base_color: color, specular: 0.0, ..Opaque::default() };
+    let ball = |surface| in_white(scene([Part::of(icosphere(5), Surface::Opaque(surface))]));
+    let found = picture(&validated, &ball(matte), Shot { samples: 64, ..Shot::default() });
+    let centre = found.radiance[found.radiance.len() / 2 + 24];
+    assert!((centre - color).abs().max_element() < 1e-5, "{centre}");
+    for roughness in [0.0, 0.3, 1.0] {
+        let metal = Opaque { base_color: DVec3::ONE, metallic: 1.0, roughness, ..Opaque::default() };
+        let found = picture(&validated, &ball(metal), Shot { samples: 64, ..Shot::default() });
+        assert!(found.mean().max_element() < 1.001, "{roughness}: {}", found.mean());
+    }
+    validated.verdict();
+}
