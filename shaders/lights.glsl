@@ -12,6 +12,7 @@
 #include "opaque.glsl"
 #include "pixel.glsl"
 #include "records.glsl"
+#include "skylight.glsl"
 #include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -48,16 +49,48 @@ struct LightRay {
     vec3 direction;
     vec3 throughput;   // radiance that arrives from a point light, or the weight of the environment's
     float reach;       // distance of a point light; infinite: the environment
-    float lod;
     Whereabouts at;
     Found left;
 };
 
-// Lights of a point: point lights, then directions to the environment for what is scattered, then for what is mirrored.
+// Whether a surface mirrors light into more than one direction.
+bool IsGlossy(OpaqueSurface surface)
+{
+    return IsSpecular(surface) && !IsMirror(surface);
+}
+
+// Lights of a point: point lights, then directions to the environment chosen by how bright it is, or where that is the same
+// everywhere by what is scattered; then those chosen by what is mirrored.
 uint LightsOf(Lit lit)
 {
-    bool spread = IsSpecular(lit.surface) && !IsMirror(lit.surface);
-    return frame.lightCount + (spread ? 2 : 1) * frame.normals;
+    return frame.lightCount + (IsGlossy(lit.surface) ? 2 : 1) * frame.normals;
+}
+
+// A direction to the environment, and how often the ways to choose one choose it.
+struct Towards {
+    vec3 wo;
+    float pdf;   // per steradian
+};
+
+// Direction `number`, from 0 to below twice frame.normals. Balanced: a direction counts as often as either way would have chosen it
+// (Veach & Guibas 1995).
+Towards AskSky(uint number, Lit lit)
+{
+    vec2 u = PlasticPoint(sampleIndex * frame.normals + number % frame.normals, uvec2(frame.seed, GOLDEN_STEP));
+    bool bySky = ENVIRONMENT_IMAGE && cellCount.x != 0;
+    Towards towards;
+    if (number >= frame.normals) {
+        towards.wo = SpecularDirection(lit.surface, lit.wi, u);
+        towards.pdf = bySky ? SkyPdf(lit.toWorld * towards.wo) : DiffusePdf(towards.wo);
+    } else if (bySky) {
+        SkySample chosen = SampleSky(u);
+        towards = Towards(chosen.direction * lit.toWorld, chosen.pdf);
+    } else {
+        towards.wo = DiffuseDirection(u);
+        towards.pdf = DiffusePdf(towards.wo);
+    }
+    if (IsGlossy(lit.surface)) towards.pdf += SpecularPdf(lit.surface, lit.wi, towards.wo);
+    return towards;
 }
 
 // The ray to light `number` of the point of `record`; false if its light cannot be seen. Every pixel takes the same directions, each
@@ -65,30 +98,22 @@ uint LightsOf(Lit lit)
 bool AskFor(uint number, Record record, Lit lit, out LightRay ray)
 {
     vec3 wo;
+    vec3 light;
     if (number < frame.lightCount) {
         vec3 toLight = lights[number].position - lit.arrival.position;
         ray.reach = max(length(toLight), 1e-30);
         wo = toLight / ray.reach * lit.toWorld;
         // Light is given as it is in the medium that the surface lies in.
         bool disperses = false;
-        float index = IndexOf(record.medium, D_LINE, disperses);
-        float spread = ray.reach * index;
-        ray.throughput = EvaluateOpaque(lit.surface, lit.wi, wo) * lights[number].intensity / (spread * spread);
-        if (!DIRECT_LIGHT) ray.throughput = vec3(0.0);
-        ray.lod = 0.0;
+        float spread = ray.reach * IndexOf(record.medium, D_LINE, disperses);
+        light = DIRECT_LIGHT ? lights[number].intensity / (spread * spread) : vec3(0.0);
     } else {
-        number -= frame.lightCount;
-        uint index = sampleIndex * frame.normals + number % frame.normals;
-        vec2 u = PlasticPoint(index, uvec2(frame.seed, GOLDEN_STEP));
-        LightSample light;
-        if (number < frame.normals) light = SampleDiffuse(lit.surface, lit.wi, u); else light = SampleSpecular(lit.surface, lit.wi, u);
-        wo = light.wo;
+        Towards towards = AskSky(number - frame.lightCount, lit);
+        wo = towards.wo;
         ray.reach = LARGEST_FLOAT;
-        ray.throughput = light.weight / float(frame.normals);
-        float inAll = frame.normalsInAll != 0 ? float(frame.normalsInAll) : float(index + 1);
-        ray.lod = frame.environmentLevels > 1 ? EnvironmentLod(1.0 / (inAll * light.pdf), UnitFloat(index * GOLDEN_STEP)) : 0.0;
+        light = vec3(towards.pdf > 0.0 ? 1.0 / (towards.pdf * float(frame.normals)) : 0.0);
     }
-    ray.throughput *= record.throughput;
+    ray.throughput = record.throughput * EvaluateOpaque(lit.surface, lit.wi, wo) * light;
     ray.direction = normalize(lit.toWorld * wo);
     ray.origin = LeaveFrom(lit.arrival, ray.direction);
     ray.left = lit.arrival.found;
@@ -104,7 +129,10 @@ void PassThrough(inout LightRay light, Material material, Arrival arrival)
     Crossing crossing = CrossingOf(arrival.found, material, arrival.behind, light.at, D_LINE, disperses);
     light.throughput *= Absorbed(crossing.boundary.before.medium, arrival.distance);
     vec3 normal = arrival.behind ? -arrival.normal : arrival.normal;
-    Interface crossed = FresnelDielectric(max(dot(-light.direction, normal), LEAST_SLOPE), crossing.etaI, crossing.etaT);
+    // A ray that goes straight on has the direction that it would have outside: seen from there nothing is totally reflected.
+    float thinner = min(crossing.etaI, crossing.etaT);
+    float denser = max(crossing.etaI, crossing.etaT);
+    Interface crossed = FresnelDielectric(max(dot(-light.direction, normal), LEAST_SLOPE), thinner, denser);
     light.throughput *= crossing.isPane && !crossed.total ? crossed.transmittance / (1.0 + crossed.reflectance) : crossed.transmittance;
     light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
     light.at = crossing.boundary.beyond;
@@ -119,7 +147,7 @@ void main()
     if (recordsRepeat != 0 && recordCount > recordCapacity) return;
     Sample one = samples[SampleAt(place)];
     float scale = frame.cameraIndex * frame.cameraIndex;
-    LightRay light = LightRay(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, 0.0, Whereabouts(0, Bodies(uvec4(0))), NOWHERE);
+    LightRay light = LightRay(vec3(0.0), vec3(0.0), vec3(0.0), 0.0, Whereabouts(0, Bodies(uvec4(0))), NOWHERE);
     uint head = one.head;
     uint number = 0;
     uint passed = 0;
@@ -148,13 +176,36 @@ void main()
             }
             if (meets) arrival = ArriveAt(found, light.origin, light.direction);
             onItsWay = meets && arrival.distance < light.reach;
+            bool isBlocked = false;
+            vec3 share = vec3(1.0);
+            vec3 emission = vec3(0.0);
+            vec3 towards = light.direction;
+            float lod = 0.0;
             if (onItsWay) {
                 Material material = materials[instances[found.instance].material];
-                PassThrough(light, material, arrival);
-                onItsWay = material.kind != KIND_OPAQUE && Largest(abs(light.throughput)) > LEAST_SHARE && ++passed <= MOST_PASSED;
-            } else {
-                vec3 radiance = light.reach == LARGEST_FLOAT ? SampleEnvironment(light.direction, light.lod)
-                    : Absorbed(light.at.medium, light.reach);
+                isBlocked = material.kind == KIND_OPAQUE;
+                if (isBlocked) {
+                    // What stands in the way of the environment sends its own light, and its colour of what the half of the environment
+                    // before it sends, whatever else is there.
+                    bool disperses = false;
+                    float index = IndexOf(light.at.medium, D_LINE, disperses);
+                    share = material.baseColor;
+                    emission = material.emission / (index * index);
+                    towards = arrival.behind ? -arrival.normal : arrival.normal;
+                    lod = EnvironmentLod(2.0 * PI, 0.0);
+                    light.throughput *= Absorbed(light.at.medium, arrival.distance);
+                    onItsWay = false;
+                } else {
+                    PassThrough(light, material, arrival);
+                    onItsWay = Largest(abs(light.throughput)) > LEAST_SHARE && ++passed <= MOST_PASSED;
+                    isBlocked = !onItsWay;
+                    share = vec3(0.0);
+                }
+            }
+            if (!onItsWay) {
+                vec3 radiance = vec3(0.0);
+                if (light.reach == LARGEST_FLOAT) radiance = share * SampleEnvironment(towards, lod) + emission;
+                else if (!isBlocked) radiance = Absorbed(light.at.medium, light.reach);
                 one.value.rgb += scale * light.throughput * radiance;
             }
         }

@@ -63,6 +63,24 @@ vec3 EvaluateOpaque(OpaqueSurface surface, vec3 wi, vec3 wo)
     return value;
 }
 
+// A direction to the light, for what is scattered below the facets: as the cosine.
+vec3 DiffuseDirection(vec2 u)
+{
+    return vec3(sqrt(u.y) * CosSinTurns(u.x), sqrt(max(1.0 - u.y, 0.0)));
+}
+
+float DiffusePdf(vec3 wo)
+{
+    return max(wo.z, 0.0) / PI;
+}
+
+// And for what facets mirror: visible ones.
+vec3 SpecularDirection(OpaqueSurface surface, vec3 wi, vec2 u)
+{
+    vec3 wm = SampleVisibleNormal(wi, surface.alpha, u);
+    return 2.0 * dot(wi, wm) * wm - wi;
+}
+
 // The share of directions that are chosen for what facets mirror.
 float SpecularChance(OpaqueSurface surface, vec3 wi)
 {
@@ -73,47 +91,22 @@ float SpecularChance(OpaqueSurface surface, vec3 wi)
     return mirror / max(mirror + below, 1e-30);
 }
 
+// The density of SpecularDirection choosing wo, per steradian, of surfaces that are no mirrors.
+float SpecularPdf(OpaqueSurface surface, vec3 wi, vec3 wo)
+{
+    if (wi.z <= 0.0 || wo.z <= 0.0) return 0.0;
+    vec3 wm = normalize(wi + wo);
+    return DistributionGGX(wm.z, dot(wm.xy, wm.xy), surface.alpha) * MaskingOverCosineGGX(wi.z, dot(wi.xy, wi.xy), surface.alpha) / 2.0;
+}
+
 // The density of SampleOpaque choosing wo, per steradian, but for directions that a mirror has no choice about.
 float OpaquePdf(OpaqueSurface surface, vec3 wi, vec3 wo)
 {
     if (wi.z <= 0.0 || wo.z <= 0.0) return 0.0;
     float chance = SpecularChance(surface, wi);
-    float pdf = (1.0 - chance) * wo.z / PI;
-    if (chance > 0.0 && !IsMirror(surface)) {
-        vec3 wm = normalize(wi + wo);
-        pdf += chance * DistributionGGX(wm.z, dot(wm.xy, wm.xy), surface.alpha)
-            * MaskingOverCosineGGX(wi.z, dot(wi.xy, wi.xy), surface.alpha) / 2.0;
-    }
+    float pdf = (1.0 - chance) * DiffusePdf(wo);
+    if (chance > 0.0 && !IsMirror(surface)) pdf += chance * SpecularPdf(surface, wi, wo);
     return pdf;
-}
-
-// A direction to the light, what its radiance is worth, and the density of such directions.
-struct LightSample {
-    vec3 wo;
-    vec3 weight;
-    float pdf;
-};
-
-// For what is scattered below the facets: as the cosine.
-LightSample SampleDiffuse(OpaqueSurface surface, vec3 wi, vec2 u)
-{
-    vec2 around = CosSinTurns(u.x);
-    vec3 wo = vec3(sqrt(u.y) * around, sqrt(max(1.0 - u.y, 0.0)));
-    float cosine = dot(wi, normalize(wi + wo));
-    return LightSample(wo, surface.diffuse * BelowFacets(surface, cosine), max(wo.z, 1e-4) / PI);
-}
-
-// For what facets mirror: visible ones.
-LightSample SampleSpecular(OpaqueSurface surface, vec3 wi, vec2 u)
-{
-    vec3 wm = SampleVisibleNormal(wi, surface.alpha, u);
-    float cosine = dot(wi, wm);
-    vec3 wo = 2.0 * cosine * wm - wi;
-    if (wo.z <= 0.0) return LightSample(wo, vec3(0.0), 1.0);
-    float pdf = DistributionGGX(wm.z, dot(wm.xy, wm.xy), surface.alpha)
-        * MaskingOverCosineGGX(wi.z, dot(wi.xy, wi.xy), surface.alpha) / 2.0;
-    float masking = MaskingGGX(wo.z, dot(wo.xy, wo.xy), surface.alpha);
-    return LightSample(wo, FacetReflectance(surface, cosine) * masking, max(pdf, 1e-6));
 }
 
 #endif

@@ -24,9 +24,9 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(constant_id = 66) const bool SAMPLE_LIGHTS = true;
 layout(constant_id = 67) const bool SAMPLE_SURFACES = true;
 
-layout(set = 0, binding = 14, rgba32f) uniform image2D mean;    // radiance
-layout(set = 0, binding = 15, rgba32f) uniform image2D counts;  // interfaces, rays
-layout(set = 0, binding = 16, rgba32f) uniform image2D spread;  // sum of squared differences of the batches' means from their mean, and their number
+layout(set = 0, binding = 15, rgba32f) uniform image2D mean;    // radiance
+layout(set = 0, binding = 16, rgba32f) uniform image2D counts;  // interfaces, rays
+layout(set = 0, binding = 17, rgba32f) uniform image2D spread;  // sum of squared differences of the batches' means from their mean, and their number
 
 // Pixels in a row of a workgroup's that one invocation takes, one after the other; as in src/passes/path.rs.
 const int PIXELS = 4;
@@ -105,7 +105,7 @@ Next SampleOpaque(OpaqueSurface surface, vec3 wi, vec2 u, float choice)
     float chance = SpecularChance(surface, wi);
     bool isSpecular = choice < chance;
     if (isSpecular && IsMirror(surface)) return Next(vec3(-wi.xy, wi.z), FacetReflectance(surface, wi.z) / chance, NO_PDF);
-    vec3 wo = isSpecular ? SampleSpecular(surface, wi, u).wo : SampleDiffuse(surface, wi, u).wo;
+    vec3 wo = isSpecular ? SpecularDirection(surface, wi, u) : DiffuseDirection(u);
     float pdf = OpaquePdf(surface, wi, wo);
     return Next(wo, pdf > 0.0 ? EvaluateOpaque(surface, wi, wo) / pdf : vec3(0.0), pdf);
 }
@@ -182,7 +182,7 @@ bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pa
     vec3 radiance;
     float pdf = 0.0;
     if (toSky) {
-        SkySample chosen = SampleSky(choice, u);
+        SkySample chosen = SampleSky(u);
         light.direction = normalize(chosen.direction);
         pdf = chosen.pdf;
         radiance = SampleEnvironment(light.direction, 0.0) / pdf;

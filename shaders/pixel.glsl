@@ -4,8 +4,8 @@
 
 #include "shared.glsl"
 
-layout(set = 0, binding = 14, rgba32f) uniform image2D mean;    // radiance, and throughput cut off
-layout(set = 0, binding = 15, rgba32f) uniform image2D counts;  // interfaces, rays
+layout(set = 0, binding = 15, rgba32f) uniform image2D mean;    // radiance, and throughput cut off
+layout(set = 0, binding = 16, rgba32f) uniform image2D counts;  // interfaces, rays
 
 struct Sample {
     vec4 value;       // radiance, and throughput cut off
@@ -16,7 +16,7 @@ struct Sample {
 };
 
 // Samples of the rows being traced that wait for the light of opaque surfaces.
-layout(std430, set = 0, binding = 16) buffer SampleBuffer { Sample samples[]; };
+layout(std430, set = 0, binding = 17) buffer SampleBuffer { Sample samples[]; };
 
 uint SampleAt(ivec2 place)
 {

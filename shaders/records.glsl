@@ -17,7 +17,7 @@ struct Record {
     uvec2 color;      // of the surface, four numbers from 0 to 1 of 16 bits
 };
 
-layout(std430, set = 0, binding = 17) buffer RecordBuffer {
+layout(std430, set = 0, binding = 18) buffer RecordBuffer {
     uint recordCount;     // that were to be left, those beyond the capacity too
     uint recordCapacity;
     uint recordsRepeat;   // 1: where some were lost the rows are traced once more

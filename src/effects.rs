@@ -112,8 +112,7 @@ fn nests(scene: &Scene) -> bool {
     if scene.objects.iter().filter(is_dielectric).any(|object| scene.meshes[object.mesh].overlaps) {
         return true;
     }
-    let boxes: Vec<_> =
-        scene.objects.iter().filter(is_dielectric).map(|object| scene.bounds_of(object)).collect();
+    let boxes: Vec<_> = scene.objects.iter().filter(is_dielectric).map(|object| scene.bounds_of(object)).collect();
     boxes
         .iter()
         .enumerate()

@@ -157,8 +157,12 @@ impl Plan {
         let most = args.samples.unwrap_or(MOST_SAMPLES);
         let budget = match args.time_budget {
             Some(seconds) => Budget::Seconds { seconds, most },
-            None if model == Model::Path && args.tolerance.is_some() => Budget::Seconds { seconds: f64::INFINITY, most },
-            None => Budget::Samples(args.samples.unwrap_or(if model == Model::Path { SAMPLES_OF_PATH } else { SAMPLES })),
+            None if model == Model::Path && args.tolerance.is_some() => {
+                Budget::Seconds { seconds: f64::INFINITY, most }
+            }
+            None => {
+                Budget::Samples(args.samples.unwrap_or(if model == Model::Path { SAMPLES_OF_PATH } else { SAMPLES }))
+            }
         };
         let depth = if args.tolerance.is_some() && model == Model::Tree { DEPTH_OF_TOLERANCE } else { DEPTH };
         let max_depth = (model != Model::Single).then(|| args.max_depth.unwrap_or(depth));

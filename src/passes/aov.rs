@@ -4,8 +4,8 @@ use super::geometry::Draw;
 use super::resources::Resources;
 use super::view;
 use crate::gpu::{
-    BindGroup, Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime, Result,
-    SamplePush, Target, Use, shaders,
+    BindGroup, Commands, Depth, Format, Gpu, GraphicsPipeline, GraphicsPipelineDesc, Image, ImageDesc, PassTime,
+    Result, SamplePush, Target, Use, shaders,
 };
 use crate::options::Size;
 use glam::DVec2;

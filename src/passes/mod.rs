@@ -119,8 +119,7 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
         times.add(passes.sample(&mut commands, &resources, &targets, &resources.draws, round.push)?);
         samples += round.samples;
         progress(samples);
-        if is_spent(plan.budget, set_up, start.elapsed(), rounds)
-            || is_precise(&mut commands, &targets, plan, rounds)?
+        if is_spent(plan.budget, set_up, start.elapsed(), rounds) || is_precise(&mut commands, &targets, plan, rounds)?
         {
             break;
         }

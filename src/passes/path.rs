@@ -36,7 +36,6 @@ impl PathTargets {
         let (counts, spread) = (image("counts")?, image("spread")?);
         let mut bindings = resources.traced.clone();
         bindings.extend([mean, &counts, &spread].map(|image| Bind::Storage(image.clone())));
-        bindings.extend(resources.sky.clone());
         Ok(Self { group: BindGroup::new(gpu, "path", bindings)?, counts, spread })
     }
 }

@@ -39,8 +39,6 @@ pub(super) struct Resources {
     pub(super) group: BindGroup,
     /// The same with what only traced models read.
     pub(super) traced: Vec<Bind>,
-    /// The environment as a light, for `path`.
-    pub(super) sky: Option<Bind>,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
@@ -131,19 +129,14 @@ impl Resources {
             traced.push(buffer(commands.upload_buffer("materials of the bodies", &ranked)?));
             traced.push(buffer(commands.upload_buffer("texture coordinates", &geometry.uvs)?));
             traced.push(buffer(commands.upload_buffer("texels", &texels)?));
+            let rough = plan.model == Model::Path && plan.effects.contains(Effect::Roughness);
+            let cells = if is_image && (opaque || rough) { skylight::table(panorama) } else { skylight::none() };
+            traced.push(buffer(commands.upload_buffer("cells of the environment", &cells)?));
         }
-        let sky = match plan.model {
-            Model::Path => {
-                let table = if is_image { skylight::table(panorama) } else { vec![skylight::Cell::default()] };
-                Some(buffer(commands.upload_buffer("the environment as a light", &table)?))
-            }
-            _ => None,
-        };
         let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
         Ok(Self {
             group: BindGroup::new(commands.gpu(), "scene", bindings)?,
             traced,
-            sky,
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)
@@ -213,7 +206,7 @@ fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<MaterialRecord>, V
     let record = |material: &Material| {
         let glass = match &material.surface {
             Surface::Dielectric(glass) => glass,
-            Surface::Opaque(opaque) => return opaque_record(opaque),
+            Surface::Opaque(opaque) => return opaque_record(scene, opaque),
         };
         let &Dielectric { ior, roughness, .. } = glass;
         let (mut albedo_table, mut albedo_tables) = (0, 0);
@@ -259,9 +252,11 @@ fn dispersion(glass: &Dielectric) -> f32 {
     }
 }
 
-fn opaque_record(opaque: &Opaque) -> MaterialRecord {
+fn opaque_record(scene: &Scene, opaque: &Opaque) -> MaterialRecord {
+    // Of an image its mean, for those who do not look closer.
+    let base_color = opaque.base_color_texture.map_or(opaque.base_color, |texture| mean(&scene.textures[texture]));
     MaterialRecord {
-        base_color: opaque.base_color.as_vec3(),
+        base_color: base_color.as_vec3(),
         roughness: opaque.roughness as f32,
         emission: opaque.emission.as_vec3(),
         metallic: opaque.metallic as f32,
@@ -291,6 +286,16 @@ fn texels(textures: &[Texture]) -> Vec<u32> {
         }
     }
     words
+}
+
+/// The mean colour of a texture.
+fn mean(texture: &Texture) -> DVec3 {
+    let wide = |texel: [f32; 3]| DVec3::from_array(texel.map(f64::from));
+    let sum: DVec3 = match &texture.texels {
+        Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| wide([r, g, b].map(decode_srgb))).sum(),
+        Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| wide([r, g, b].map(f16::to_f32))).sum(),
+    };
+    sum / f64::from(texture.width) / f64::from(texture.height)
 }
 
 fn pack_texel(texel: [f32; 3]) -> [u32; 2] {

@@ -1,58 +1,63 @@
-//! The environment as a light: a table that chooses directions by how bright it is there. In flows a panorama, out flow cells for
+//! The environment as a light: a table that chooses directions by how bright it is there. In flows a panorama, out flow numbers for
 //! `shaders/skylight.glsl`.
 
-use std::f64::consts::{PI, TAU};
-
-use bytemuck::{Pod, Zeroable};
+use std::f64::consts::PI;
 
 use crate::scene::Panorama;
 
 /// The most cells of a table; a panorama of more texels is halved.
 const MOST_CELLS: u32 = 1 << 19;
 
-/// `Cell` of `shaders/skylight.glsl`.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
-pub(super) struct Cell {
-    other: u32,
-    share: f32,
-    density: f32,
-    padding: u32,
+/// The table of an environment that is not looked for.
+pub(super) fn none() -> Vec<f32> {
+    header(0, 0)
 }
 
-/// What stands before the cells, and they: none where there is no light to look for.
-pub(super) fn table(panorama: &Panorama) -> Vec<Cell> {
+/// `cellCount`, and the padding behind it.
+fn header(columns: u32, rows: u32) -> Vec<f32> {
+    [columns, rows, 0, 0].map(f32::from_bits).to_vec()
+}
+
+/// Shares of the light that comes from each row of a panorama, and of each row's from each column, added up; none of one without
+/// light.
+pub(super) fn table(panorama: &Panorama) -> Vec<f32> {
     let halved = |panorama: &Panorama| (panorama.width * panorama.height > MOST_CELLS).then(|| panorama.halved());
     let smaller = std::iter::successors(halved(panorama), halved).last();
     let panorama = smaller.as_ref().unwrap_or(panorama);
-    let (columns, rows) = (panorama.width, panorama.height);
     let light = light(panorama);
-    let solid_angle = |row: u32| {
-        let edge = |row: u32| (PI * f64::from(row) / f64::from(rows)).cos();
-        TAU / f64::from(columns) * (edge(row) - edge(row + 1))
-    };
-    let solid_angles: Vec<f64> = (0..rows).map(solid_angle).collect();
-    let weights: Vec<f64> =
-        light.iter().enumerate().map(|(i, light)| light * solid_angles[i / columns as usize]).collect();
-    let whole: f64 = weights.iter().sum();
+    let rows: Vec<&[f64]> = light.chunks(panorama.width as usize).collect();
+    let edge = |row: usize| (PI * row as f64 / rows.len() as f64).cos();
+    let of_rows: Vec<f64> =
+        rows.iter().enumerate().map(|(i, row)| row.iter().sum::<f64>() * (edge(i) - edge(i + 1))).collect();
+    let whole: f64 = of_rows.iter().sum();
     if whole.is_nan() || whole <= 0.0 {
-        return vec![Cell::default()];
+        return none();
     }
-    let mut cells = aliases(&weights, whole);
-    for (i, cell) in cells.iter_mut().enumerate() {
-        cell.density = (light[i] / whole) as f32;
+    let mut table = header(panorama.width, panorama.height);
+    add_up(&mut table, &of_rows);
+    for row in rows {
+        add_up(&mut table, row);
     }
-    // `cellCount`.
-    cells.insert(0, bytemuck::cast([columns, rows, 0, 0]));
-    cells
+    table
 }
 
-/// The mean radiance that each texel's part of the sphere sends, interpolation with its neighbours included: above 0 wherever light
-/// comes from.
+/// What lies before each part and at the end, as shares of the whole; even ones of nothing.
+fn add_up(table: &mut Vec<f32>, parts: &[f64]) {
+    let whole: f64 = parts.iter().sum();
+    let count = parts.len() as f64;
+    let mut sum = 0.0;
+    table.push(0.0);
+    for (i, part) in (1..).zip(parts) {
+        sum += part;
+        table.push(if whole > 0.0 { sum / whole } else { f64::from(i) / count } as f32);
+    }
+}
+
+/// The mean luminance of each texel's part of the sphere, interpolation with its neighbours included: above 0 wherever light comes
+/// from.
 fn light(panorama: &Panorama) -> Vec<f64> {
     let (width, height) = (panorama.width as usize, panorama.height as usize);
-    let luminance =
-        |&[r, g, b]: &[f32; 3]| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
+    let luminance = |&[r, g, b]: &[f32; 3]| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
     let texels: Vec<f64> = panorama.texels.iter().map(luminance).collect();
     // Of a line between texels' centres 3/4 of what lies in a texel is its own, and 1/8 that of each neighbour.
     let mean = |before: f64, own: f64, after: f64| 0.75 * own + 0.125 * (before + after);
@@ -68,59 +73,36 @@ fn light(panorama: &Panorama) -> Vec<f64> {
         .collect()
 }
 
-/// Walker's alias method, set up as by M. D. Vose, "A Linear Algorithm for Generating Random Numbers with a Given Distribution"
-/// (1991).
-fn aliases(weights: &[f64], whole: f64) -> Vec<Cell> {
-    let mean = whole / weights.len() as f64;
-    let mut shares: Vec<f64> = weights.iter().map(|weight| weight / mean).collect();
-    let mut cells: Vec<Cell> = (0..).zip(weights).map(|(other, _)| Cell { other, share: 1.0, ..Cell::default() }).collect();
-    let (mut dark, mut bright): (Vec<usize>, Vec<usize>) = (0..shares.len()).partition(|&i| shares[i] < 1.0);
-    while let (Some(&low), Some(&high)) = (dark.last(), bright.last()) {
-        dark.pop();
-        cells[low] = Cell { other: high as u32, share: shares[low] as f32, ..Cell::default() };
-        shares[high] -= 1.0 - shares[low];
-        if shares[high] < 1.0 {
-            bright.pop();
-            dark.push(high);
-        }
-    }
-    cells
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    fn panorama() -> Panorama {
-        let mut texels: Vec<[f32; 3]> = (0..13 * 7).map(|i| [0.1 * (i % 5) as f32, 0.2, 0.05 * (i % 7) as f32]).collect();
+    #[test]
+    fn cells_have_their_shares_of_the_light() {
+        let (width, height) = (13, 7);
+        let texel = |i: u32| [0.1 * (i % 5) as f32, 0.2, 0.05 * (i % 7) as f32];
+        let mut texels: Vec<[f32; 3]> = (0..width * height).map(texel).collect();
         texels[13 * 2 + 5] = [500.0; 3];
-        Panorama::new(13, 7, texels)
+        let panorama = Panorama::new(width, height, texels);
+        let light = light(&panorama);
+        let table = table(&panorama);
+        assert_eq!([table[0].to_bits(), table[1].to_bits()], [width, height]);
+        let (rows, columns) = table[4..].split_at(8);
+        let edge = |row: usize| (PI * row as f64 / 7.0).cos();
+        let weight = |i: usize| light[i] * (edge(i / 13) - edge(i / 13 + 1));
+        let whole: f64 = (0..13 * 7).map(weight).sum();
+        for i in 0..13 * 7 {
+            let (row, column) = (i / 13, i % 13);
+            let own = &columns[14 * row..][..14];
+            let share = f64::from(rows[row + 1] - rows[row]) * f64::from(own[column + 1] - own[column]);
+            assert!((share - weight(i) / whole).abs() < 1e-6, "{i}: {share}");
+        }
+        assert_eq!((rows[7], columns[13]), (1.0, 1.0));
     }
 
     #[test]
-    fn cells_are_chosen_as_often_as_their_density_says() {
-        let table = table(&panorama());
-        let [columns, rows, ..]: [u32; 4] = bytemuck::cast(table[0]);
-        assert_eq!((columns, rows), (13, 7));
-        let cells = &table[1..];
-        let mut chances = vec![0.0; cells.len()];
-        for (i, cell) in cells.iter().enumerate() {
-            chances[i] += f64::from(cell.share) / cells.len() as f64;
-            chances[cell.other as usize] += (1.0 - f64::from(cell.share)) / cells.len() as f64;
-        }
-        let mut sum = 0.0;
-        for (i, (chance, cell)) in chances.iter().zip(cells).enumerate() {
-            let edge = |row: usize| (PI * row as f64 / 7.0).cos();
-            let solid_angle = TAU / 13.0 * (edge(i / 13) - edge(i / 13 + 1));
-            assert!((chance - f64::from(cell.density) * solid_angle).abs() < 1e-6, "{i}: {chance} {cell:?}");
-            sum += chance;
-        }
-        assert!((sum - 1.0).abs() < 1e-6, "{sum}");
-    }
-
-    #[test]
-    fn a_black_environment_has_no_cells() {
-        let black = Panorama::new(4, 2, vec![[0.0; 3]; 8]);
-        assert_eq!(table(&black), [Cell::default()]);
+    fn a_black_environment_is_not_looked_for() {
+        assert_eq!(table(&Panorama::new(4, 2, vec![[0.0; 3]; 8])), none());
+        assert_eq!(none()[0].to_bits(), 0);
     }
 }

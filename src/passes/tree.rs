@@ -4,12 +4,12 @@
 use std::sync::Arc;
 use std::time::Instant;
 
-use super::{RADIANCE, Targets};
 use super::resources::Resources;
 use super::slices::{GROUP, Slices};
+use super::{RADIANCE, Targets};
 use crate::gpu::{
-    Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result, SamplePush, Use,
-    shaders,
+    Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result,
+    SamplePush, Use, shaders,
 };
 use crate::options::Trace;
 
@@ -94,7 +94,12 @@ impl TreeTargets {
 }
 
 impl Tree {
-    pub(super) fn new(commands: &mut Commands, resources: &Resources, targets: &TreeTargets, trace: Trace) -> Result<Self> {
+    pub(super) fn new(
+        commands: &mut Commands,
+        resources: &Resources,
+        targets: &TreeTargets,
+        trace: Trace,
+    ) -> Result<Self> {
         let (tree, lights) = match trace {
             Trace::Hardware => (&shaders::TREE_HARDWARE_COMP, &shaders::LIGHTS_HARDWARE_COMP),
             Trace::Software => (&shaders::TREE_COMP, &shaders::LIGHTS_COMP),

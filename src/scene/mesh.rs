@@ -8,8 +8,8 @@ use std::fmt;
 
 use glam::{DAffine3, DVec3, Vec3};
 
-use super::topology::{self, Topology};
 use super::Bounds;
+use super::topology::{self, Topology};
 
 /// The farthest a vertex, light or camera may lie from the origin. The renderer's 32-bit arithmetic squares areas:
 /// (1e9)^4 = 1e36 is still finite.

@@ -56,7 +56,11 @@ pub fn picture(validated: &Validated, scene: &Scene, shot: Shot) -> Picture {
     let counts = rendered.counts.expect("counts");
     let stderr = wide(&counts.stderr.expect("standard errors"));
     let radiance = wide(&rendered.radiance);
-    assert!(radiance.iter().chain(&stderr).all(|value| value.is_finite()), "{}: values that are not finite", scene.name);
+    assert!(
+        radiance.iter().chain(&stderr).all(|value| value.is_finite()),
+        "{}: values that are not finite",
+        scene.name
+    );
     Picture { radiance, stderr, interfaces: counts.interfaces.into_iter().map(f64::from).collect() }
 }
 

@@ -6,15 +6,14 @@ use vitrum::options::Trace;
 use vitrum::scene::{Dielectric, Dispersion, Scene, Surface};
 
 use crate::bodies::{
-    asset, balls_in_water, ball, diamond, hollow, in_the_city, made_prism, pane, slab, water_in_a_glass,
+    asset, ball, balls_in_water, diamond, hollow, in_the_city, made_prism, pane, slab, water_in_a_glass,
 };
 use crate::common::Validated;
 use crate::device::{Picture, Shot, picture, tree};
 use crate::shapes::{Part, glass, icosphere, scene};
 
 fn scenes() -> Vec<(&'static str, Scene)> {
-    let tinted =
-        Dielectric { attenuation_color: DVec3::new(0.2, 0.6, 0.9), attenuation_distance: 0.5, ..glass(1.5) };
+    let tinted = Dielectric { attenuation_color: DVec3::new(0.2, 0.6, 0.9), attenuation_distance: 0.5, ..glass(1.5) };
     let disperser = Dielectric { dispersion: Dispersion::Khr(1.0), ..glass(1.6) };
     let prism = Part { smooth: false, ..Part::of(asset("prism.obj"), Surface::Dielectric(disperser.clone())) };
     vec![
@@ -67,10 +66,10 @@ fn hardware_and_software_find_the_same() {
     }
     for (name, scene) in scenes().into_iter().take(3) {
         let scene = in_the_city(scene);
-        let [hardware, software] = [Trace::Hardware, Trace::Software].map(|trace| {
-            picture(&validated, &scene, Shot { samples: 32, trace: Some(trace), ..Shot::default() })
-        });
-        let differing = hardware.radiance.iter().zip(&software.radiance).filter(|(a, b)| a.distance(**b) > 1e-3).count();
+        let [hardware, software] = [Trace::Hardware, Trace::Software]
+            .map(|trace| picture(&validated, &scene, Shot { samples: 32, trace: Some(trace), ..Shot::default() }));
+        let differing =
+            hardware.radiance.iter().zip(&software.radiance).filter(|(a, b)| a.distance(**b) > 1e-3).count();
         println!("{name}: {differing} pixels differ");
         assert!(differing < hardware.radiance.len() / 50, "{name}: {differing}");
     }

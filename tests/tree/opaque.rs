@@ -108,12 +108,14 @@ fn in_white_light_a_board_has_its_colour_a_mirror_mirrors_and_lamps_shine() {
     let Some(device) = Device::open() else { return };
     let texels = [[0.25_f32, 0.5, 0.75], [1.0, 0.0, 0.125]];
     let texel = |[r, g, b]: [f32; 3]| [r, g, b, 1.0].map(f16::from_f32);
-    let texture = Texture { path: "two".into(), width: 2, height: 1, texels: Texels::Linear(texels.map(texel).to_vec()) };
+    let texture =
+        Texture { path: "two".into(), width: 2, height: 1, texels: Texels::Linear(texels.map(texel).to_vec()) };
     let mut textured = rectangle(3.0, 3.0);
     // Its left half, from the middle of one texel to the other and farther.
     textured.uvs = textured.positions.iter().map(|&[x, _, _]| [0.25 + 5.0 * x, 0.5]).collect();
     let worn = Opaque { base_color_texture: Some(0), specular: 0.0, ..Opaque::default() };
-    let image = Scene { textures: vec![texture], ..in_the_dark([Part::of(textured, Surface::Opaque(worn))], Vec::new()) };
+    let image =
+        Scene { textures: vec![texture], ..in_the_dark([Part::of(textured, Surface::Opaque(worn))], Vec::new()) };
     let silver = Opaque { base_color: DVec3::new(0.9, 0.6, 0.3), metallic: 1.0, roughness: 0.0, ..Opaque::default() };
     let mirror = in_the_dark([Part::of(rectangle(3.0, 3.0), Surface::Opaque(silver.clone()))], Vec::new());
     let color = DVec3::new(0.8, 0.3, 0.5);
@@ -130,11 +132,8 @@ fn in_white_light_a_board_has_its_colour_a_mirror_mirrors_and_lamps_shine() {
         let cosine = 2.0 / point.distance(DVec3::Z * 2.0);
         silver.base_color + (DVec3::ONE - silver.base_color) * (1.0 - cosine).powi(5)
     };
-    let cases: [(&str, Scene, &dyn Fn(DVec3) -> DVec3, f64); 3] = [
-        ("board", plain, &|_| color, 1e-6),
-        ("image", image, &of_image, 2e-4),
-        ("mirror", mirror, &of_mirror, 1e-5),
-    ];
+    let cases: [(&str, Scene, &dyn Fn(DVec3) -> DVec3, f64); 3] =
+        [("board", plain, &|_| color, 1e-6), ("image", image, &of_image, 2e-4), ("mirror", mirror, &of_mirror, 1e-5)];
     for (name, scene, expected, bound) in cases {
         let scene = in_white(scene);
         let picture = device.picture(&scene, Shot { size: SIZE, ..Shot::default() });
