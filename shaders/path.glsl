@@ -48,6 +48,13 @@ struct Ray {
     uint passed;      // boundaries in a row between equal indices
 };
 
+// Where a pixel sees smooth glass both what that reflects and what it transmits are followed: one of them is rare at most angles, and
+// would make most of the noise. One waits for the other.
+struct Waiting {
+    Ray ray;
+    bool isColored;
+};
+
 // Pairs of numbers that a path takes: for the camera, and for each interface.
 const uint PAIR_PIXEL = 0;
 const uint PAIR_WAVELENGTH = 1;
@@ -225,6 +232,9 @@ void main()
     Ray path = Ray(vec3(0.0), vec3(0.0, 0.0, -1.0), vec3(0.0), LARGEST_FLOAT, atCamera, NOWHERE, 0);
     Ray light = path;
     bool toLight = false;
+    Waiting waiting = Waiting(path, false);
+    bool waits = false;
+    float share = 1.0; // of the light of the pixel, that the path stands for
     bool goesOn = false;
     Sequence sequence = Sequence(0, 0);
     uint depth = 0;
@@ -251,6 +261,8 @@ void main()
             depth = 0;
             pdf = NO_PDF;
             toLight = false;
+            waits = false;
+            share = 1.0;
             goesOn = true;
             next = NEXT_RAY;
         }
@@ -351,22 +363,42 @@ void main()
                 float reflectance = refraction.crossed.reflectance;
                 if (crossing.isPane && !refraction.crossed.total) reflectance = 2.0 * reflectance / (1.0 + reflectance);
                 reflected = refraction.crossed.total || choice.x < reflectance;
+                vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
+                vec3 wt = direction;
+                if (!crossing.isPane && !refraction.crossed.total) wt = DirectionAbove(normalize(refraction.wt), -faceNormal);
                 if (reflected ? !REFLECTION : !TRANSMISSION) weight = vec3(0.0);
-                if (reflected) direction = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
-                else if (!crossing.isPane) direction = DirectionAbove(normalize(refraction.wt), -faceNormal);
+                if (depth == 1 && REFLECTION && TRANSMISSION && !refraction.crossed.total) {
+                    reflected = true;
+                    weight = vec3(reflectance);
+                    waiting.ray = Ray(LeaveFrom(arrival, wt), wt, ray.throughput * (1.0 - reflectance), LARGEST_FLOAT, boundary.beyond, found, 0);
+                    waiting.isColored = isColored;
+                    share = reflectance;
+                    waits = true;
+                }
+                direction = reflected ? wr : wt;
             }
             path = Ray(LeaveFrom(arrival, direction), direction, ray.throughput * weight, LARGEST_FLOAT,
                 reflected ? boundary.before : boundary.beyond, found, 0);
             float size = Largest(abs(path.throughput));
             goesOn = size > 0.0;
-            if (depth > ROULETTE_DEPTH && size < 1.0) {
-                float survival = max(size, LEAST_SURVIVAL);
+            if (depth > ROULETTE_DEPTH && size < share) {
+                float survival = max(size / share, LEAST_SURVIVAL);
                 goesOn = goesOn && choice.y < survival;
                 path.throughput /= survival;
             }
         }
 
         if (goesOn || toLight) continue;
+        if (waits) {
+            waits = false;
+            path = waiting.ray;
+            isColored = waiting.isColored;
+            share = 1.0 - share;
+            depth = 1;
+            pdf = NO_PDF;
+            goesOn = true;
+            continue;
+        }
         if (++number < samplesInBatch) {
             next = NEXT_SAMPLE;
         } else {

@@ -9,12 +9,15 @@ use indicatif::{ProgressBar, ProgressStyle};
 use super::{Talk, devices, print};
 use crate::gpu::{DeviceInfo, Gpu, Instance};
 use crate::image::{FloatImage, ImageFormat, Layer, OutputFile, encode_exr, encode_png};
-use crate::options::{Aov, Model, RenderArgs};
+use crate::options::{Aov, MOST_DEPTH, Model, RenderArgs};
 use crate::passes::{self, Rendered};
 use crate::plan::{Budget, Plan};
 use crate::report::{Run, Stats};
 use crate::scene::{Overrides, Scene};
 use crate::{Error, Result};
+
+/// Bodies that a ray can be in at one time: as in `shaders/media.glsl`.
+const MOST_BODIES: usize = 8;
 
 /// Options of `vitrum render`.
 #[derive(Debug, Args)]
@@ -76,6 +79,12 @@ impl RenderCommand {
         if plan.approximate != Default::default() {
             let (model, names) = (plan.model.name(), plan.approximate.names().join(", "));
             talk.note(&format!("note: model {model} approximates {names}; see docs/tree.md"));
+        }
+        let overlapping = scene.bodies_at_one_place();
+        if plan.model.traces() && overlapping > MOST_BODIES {
+            talk.note(&format!(
+                "warning: {overlapping} bodies may overlap at one place; of more than {MOST_BODIES} the lowest in rank are lost"
+            ));
         }
         talk.detail(&format!("device: {} ({})", device.name, device.driver));
         talk.detail(&format!("options: {}", plan.options));
@@ -185,10 +194,11 @@ fn cut_off(plan: &Plan, stats: &Stats) -> Option<String> {
     (most > promised).then(|| {
         let mean = stats.discarded.map_or(0.0, |discarded| discarded.mean);
         let advice = match plan.options.tolerance {
+            Some(_) if depth >= MOST_DEPTH => "it is trapped".into(),
             Some(_) => format!("--max-depth above {depth} may follow more of it"),
             None => format!("--tolerance or a --max-depth above {depth} follow more of it"),
         };
-        format!("note: cut off was up to {most:.4} of a pixel's light, {mean:.4} in the mean; {advice}")
+        format!("note: cut off was up to {most:.2e} of a pixel's light, {mean:.1e} in the mean; {advice}")
     })
 }
 

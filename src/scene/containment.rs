@@ -6,6 +6,9 @@ use glam::DVec3;
 
 use super::{Dielectric, Mesh, Object, Scene, Surface};
 
+/// Bodies that are asked for how many others are around their middle.
+const MOST_ASKED: usize = 4096;
+
 impl Mesh {
     /// How often the surface winds around `point`, in the mesh's space: 1 inside of a closed mesh, 0 outside and in its
     /// cavities.
@@ -73,6 +76,17 @@ impl Scene {
         ranks
     }
 
+    /// How many bodies may overlap at the middle of one of them, by their bounding boxes.
+    pub fn bodies_at_one_place(&self) -> usize {
+        let is_body = |object: &&Object| {
+            matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled)
+        };
+        let boxes: Vec<_> = self.objects.iter().filter(is_body).map(|object| self.bounds_of(object)).collect();
+        let around = |point| boxes.iter().filter(|other| other.contains(point)).count();
+        // Of thousands of bodies some are enough to find out.
+        boxes.iter().take(MOST_ASKED).map(|own| around(own.center())).max().unwrap_or(0)
+    }
+
     /// The objects that the camera is in: closed bodies that wind around it.
     pub fn bodies_around_camera(&self) -> Vec<usize> {
         (0..self.objects.len()).filter(|&number| self.camera_is_in(&self.objects[number])).collect()
@@ -101,6 +115,14 @@ mod tests {
             let found = teapot.winding_number(point);
             assert!((found - expected).abs() < 1e-9, "{point}: {found}");
         }
+    }
+
+    #[test]
+    fn bodies_in_bodies_are_counted() {
+        let scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        assert!(scene.bodies_at_one_place() <= 2);
+        let nested = Scene { objects: vec![scene.objects[0].clone(); 12], ..scene };
+        assert_eq!(nested.bodies_at_one_place(), 12);
     }
 
     /// A point just beneath the surface.

@@ -158,7 +158,7 @@ impl fmt::Display for MeshFaults {
             return f.write_str("no faults");
         }
         if !self.is_closed() {
-            f.write_str("; the surface is not closed, so it bounds no medium")?;
+            f.write_str("; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true")?;
         }
         Ok(())
     }
@@ -336,7 +336,7 @@ mod tests {
         let faults = faults(&TETRAHEDRON, &OUTWARD[..3]);
         assert_eq!(faults, MeshFaults { open_edges: 3, ..MeshFaults::default() });
         assert!(!faults.is_closed());
-        assert_eq!(faults.to_string(), "3 open edges; the surface is not closed, so it bounds no medium");
+        assert_eq!(faults.to_string(), "3 open edges; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true");
     }
 
     #[test]

@@ -65,15 +65,16 @@ pub fn picture(validated: &Validated, scene: &Scene, shot: Shot) -> Picture {
 }
 
 /// The same of the model `tree`, its throughput followed down to next to nothing.
-pub fn tree(validated: &Validated, scene: &Scene, samples: u32, depth: u32) -> Vec<DVec3> {
+pub fn tree(validated: &Validated, scene: &Scene, seed: u64, samples: u32, depth: u32) -> Vec<DVec3> {
     let args = RenderArgs {
         model: Some(Model::Tree),
         size: Some(SIZE),
         samples: Some(samples),
         max_depth: Some(depth),
+        seed: Some(seed),
         ..RenderArgs::default()
     };
-    let plan = Plan { cutoff: 1e-5, footprints: false, ..Plan::new(scene, &args).expect("a plan") };
+    let plan = Plan { cutoff: 1e-4, footprints: false, ..Plan::new(scene, &args).expect("a plan") };
     wide(&render(&validated.gpu, scene, &plan, &mut |_| {}).expect("a picture").radiance)
 }
 
