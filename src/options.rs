@@ -183,7 +183,7 @@ ranges! {
 /// What is `None` was not given; [`RenderArgs::or`] joins two of them.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct RenderArgs {
-    /// Light transport model; this version has single and tree [default: single]
+    /// Light transport model; this version has single, tree and path [default: single]
     #[arg(long, value_name = "NAME")]
     pub model: Option<Model>,
 
@@ -195,11 +195,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = range::samples)]
     pub samples: Option<u32>,
 
-    /// Longest chain of interfaces; model single sees one [default: 32; with --tolerance: 1024]
+    /// Longest chain of interfaces; model single sees one [default: 32; tree with --tolerance: 1024]
     #[arg(long, value_name = "N", value_parser = range::max_depth)]
     pub max_depth: Option<u32>,
 
-    /// Model tree: no pixel discards more than X of the light, but for chains beyond --max-depth
+    /// tree: no pixel discards more than X of the light, but for chains beyond --max-depth; path: samples until the mean relative error is below X
     #[arg(long, value_name = "X", value_parser = range::positive)]
     pub tolerance: Option<f64>,
 
@@ -235,7 +235,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME")]
     pub tonemap: Option<Tonemap>,
 
-    /// Extra layers in the EXR; model single has normal, depth, object; tree also albedo, interfaces, discarded
+    /// Extra layers in the EXR; model single has normal, depth, object; tree also albedo, interfaces, discarded; path stderr in place of discarded
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub aov: Option<Vec<Aov>>,
 

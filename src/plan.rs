@@ -171,7 +171,9 @@ impl Plan {
         let share = |honoured: bool| -> Effects {
             selected.iter().filter(|effect: &Effect| effect.honoured_by(model) == honoured).collect()
         };
-        let approximate = share(true).iter().filter(|effect| effect.approximated_by(model)).collect();
+        // Lights shine on opaque surfaces alone.
+        let lit = share(true).contains(Effect::Opaque);
+        let approximate = share(true).iter().filter(|effect| lit && effect.approximated_by(model)).collect();
         Ok(Self {
             model,
             size,

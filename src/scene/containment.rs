@@ -78,9 +78,7 @@ impl Scene {
 
     /// How many bodies may overlap at the middle of one of them, by their bounding boxes.
     pub fn bodies_at_one_place(&self) -> usize {
-        let is_body = |object: &&Object| {
-            matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled)
-        };
+        let is_body = |object: &&Object| matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled);
         let boxes: Vec<_> = self.objects.iter().filter(is_body).map(|object| self.bounds_of(object)).collect();
         let around = |point| boxes.iter().filter(|other| other.contains(point)).count();
         // Of thousands of bodies some are enough to find out.

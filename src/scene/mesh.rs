@@ -336,7 +336,10 @@ mod tests {
         let faults = faults(&TETRAHEDRON, &OUTWARD[..3]);
         assert_eq!(faults, MeshFaults { open_edges: 3, ..MeshFaults::default() });
         assert!(!faults.is_closed());
-        assert_eq!(faults.to_string(), "3 open edges; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true");
+        assert_eq!(
+            faults.to_string(),
+            "3 open edges; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true"
+        );
     }
 
     #[test]

@@ -15,8 +15,7 @@ fn what_is_wrong_with_a_mesh_is_told_with_counts() {
         folder.load("mesh.obj")
     };
     let open = load(TETRAHEDRON.replace("f 2 3 4\n", "f 2 2 3\n")).unwrap();
-    let expected =
-        "mesh.obj: 3 open edges, 1 degenerate triangle removed; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true";
+    let expected = "mesh.obj: 3 open edges, 1 degenerate triangle removed; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true";
     assert_eq!(open.warnings[0], expected);
     let inverted = load(
         TETRAHEDRON

@@ -106,7 +106,7 @@ fn huge_tiny_and_far_scenes_look_alike() {
         ("teapot and cups", built_in()),
     ] {
         let scene = in_the_city(scene);
-        let shot = Shot { size: SMALL, depth: 12, cutoff: 1e-3, ..Shot::default() };
+        let shot = Shot { size: SMALL, depth: 12, cutoff: 1e-3, footprints: true, ..Shot::default() };
         let expected = device.picture(&scene, shot);
         for (factor, shift) in [(1e6, 0.0), (1e-6, 0.0), (1.0, 1e6)] {
             let found = device.picture(&moved(&scene, factor, shift), shot);

@@ -112,3 +112,32 @@ fn what_footprints_save() {
     }
     device.verdict();
 }
+
+/// Odd sizes, single texels, coordinates that repeat a million times a metre and views along the surface: values stay numbers, and where
+/// a pixel sees more than the whole image it sees its mean.
+#[test]
+fn extreme_images_stay_finite() {
+    let Some(device) = Device::open() else { return };
+    for (width, height, repeats) in [(1, 1, 1.0), (7, 3, 1.0), (13, 1, 300.0), (1, 255, 1e6), (64, 64, 1e6)] {
+        let texels: Vec<_> = squares(width, height, 1).map(|value| [f16::from_f32(0.5 * value); 4]).collect();
+        let mean = texels.iter().map(|texel| f64::from(texel[0])).sum::<f64>() / f64::from(width * height);
+        let texture = Texture { path: "small".into(), width, height, texels: Texels::Linear(texels) };
+        let mut scene = Scene { textures: vec![texture], ..board() };
+        let uvs = &mut scene.meshes[0].uvs;
+        uvs.iter_mut().flatten().for_each(|coordinate| *coordinate *= repeats);
+        scene.objects[0].transform = DAffine3::from_rotation_x(-1.5);
+        let picture = device.picture(&scene, Shot { size: SMALL, footprints: true, ..Shot::default() });
+        if repeats > 1e5 {
+            let middle = picture.radiance[(SMALL.width * SMALL.height / 2 + SMALL.width / 2) as usize];
+            assert!((middle - mean).abs().max_element() < 0.01, "{width}x{height}: {middle}, not {mean}");
+        }
+    }
+    for (width, height) in [(1, 1), (5, 1), (1, 9), (7, 3)] {
+        let texels = squares(width, height, 1).map(|value| [value; 3]).collect();
+        let light = Surroundings::Image(Panorama::new(width, height, texels));
+        let environment = Environment { light, intensity: 1.0, rotation: 0.3, visible: true };
+        let scene = Scene { environment, ..ball() };
+        device.picture(&scene, Shot { size: SMALL, footprints: true, ..Shot::default() });
+    }
+    device.verdict();
+}

@@ -59,12 +59,12 @@ fn largest_error(picture: &Picture, expected: impl IntoIterator<Item = DVec3>) -
 fn a_board_under_a_point_light_is_lambertian_in_air_and_in_glass() {
     let Some(device) = Device::open() else { return };
     let (color, light) = (DVec3::new(0.8, 0.3, 0.5), light(DVec3::new(0.3, 0.7, 1.2)));
-    let air = in_the_dark([board(color)], vec![light.clone()]);
+    let air = in_the_dark([board(color)], vec![light]);
     // Camera, light and board inside: no interface is between them, and radiance there is radiance there.
     let tinted = Dielectric { attenuation_color: DVec3::new(0.9, 0.5, 0.2), attenuation_distance: 1.5, ..glass(1.5) };
     let body = |dielectric| Part::of(cuboid(-DVec3::splat(60.0), DVec3::splat(60.0)), Surface::Dielectric(dielectric));
-    let clear = in_the_dark([board(color), body(glass(1.5))], vec![light.clone()]);
-    let colored = in_the_dark([board(color), body(tinted.clone())], vec![light.clone()]);
+    let clear = in_the_dark([board(color), body(glass(1.5))], vec![light]);
+    let colored = in_the_dark([board(color), body(tinted.clone())], vec![light]);
     for (name, scene, tint) in [("air", air, None), ("glass", clear, None), ("tinted glass", colored, Some(tinted))] {
         let picture = device.picture(&scene, Shot { size: SIZE, ..Shot::default() });
         let expected = points(&scene).into_iter().map(|point| {
@@ -87,7 +87,7 @@ fn opaque_bodies_cast_shadows_and_panes_take_what_they_mirror() {
     let (color, light) = (DVec3::splat(0.5), light(DVec3::new(1.0, 0.0, 1.0)));
     let between = DAffine3::from_translation(DVec3::new(0.5, 0.0, 0.5)) * DAffine3::from_scale(DVec3::splat(0.2));
     let ball = Part::of(icosphere(3), Surface::Opaque(Opaque::default())).placed(between);
-    let scene = in_the_dark([board(color), ball], vec![light.clone()]);
+    let scene = in_the_dark([board(color), ball], vec![light]);
     let picture = device.picture(&scene, Shot { size: SIZE, ..Shot::default() });
     for (found, point) in picture.radiance.iter().zip(points(&scene)) {
         let way = light.position - point;
@@ -132,7 +132,8 @@ fn in_white_light_a_board_has_its_colour_a_mirror_mirrors_and_lamps_shine() {
         let cosine = 2.0 / point.distance(DVec3::Z * 2.0);
         silver.base_color + (DVec3::ONE - silver.base_color) * (1.0 - cosine).powi(5)
     };
-    let cases: [(&str, Scene, &dyn Fn(DVec3) -> DVec3, f64); 3] =
+    type Expected<'a> = &'a dyn Fn(DVec3) -> DVec3;
+    let cases: [(&str, Scene, Expected<'_>, f64); 3] =
         [("board", plain, &|_| color, 1e-6), ("image", image, &of_image, 2e-4), ("mirror", mirror, &of_mirror, 1e-5)];
     for (name, scene, expected, bound) in cases {
         let scene = in_white(scene);
@@ -163,7 +164,7 @@ fn dispersing_bodies_keep_the_colour_of_what_is_behind_them() {
     let slab = |dispersion| {
         let glass = Dielectric { dispersion, ..glass(1.6) };
         let slab = cuboid(DVec3::new(-20.0, -20.0, 1.0), DVec3::new(20.0, 20.0, 1.1));
-        in_the_dark([board(color), Part::of(slab, Surface::Dielectric(glass))], vec![light.clone()])
+        in_the_dark([board(color), Part::of(slab, Surface::Dielectric(glass))], vec![light])
     };
     let shot = Shot { size: SIZE, samples: 16, effects: "auto,-reflection", ..Shot::default() };
     let [plain, dispersed] =

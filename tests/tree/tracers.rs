@@ -13,7 +13,7 @@ fn hardware_and_software_give_the_same_picture() {
         let scene = in_the_city(scene);
         let [hardware, software] = [hardware, software].map(|trace| {
             let size = Size { width: 64, height: 48 };
-            device.picture(&scene, Shot { size, cutoff: 1e-3, trace: Some(trace), ..Shot::default() })
+            device.picture(&scene, Shot { size, cutoff: 1e-3, trace: Some(trace), footprints: true, ..Shot::default() })
         });
         let (rmse, worst) = (hardware.rmse(&software), hardware.largest_difference(&software));
         let differing = hardware.differing(&software, 1e-3);
