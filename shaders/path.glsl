@@ -74,7 +74,6 @@ float PowerHeuristic(float pdf, float other)
 // An interface that a path has met, in the local frame.
 struct Met {
     bool isOpaque;
-    bool isRough;      // a dielectric that spreads light
     OpaqueSurface surface;
     float alpha;
     float etaI;
@@ -234,7 +233,7 @@ void main()
     bool toLight = false;
     Waiting waiting = Waiting(path, false);
     bool waits = false;
-    float share = 1.0; // of the light of the pixel, that the path stands for
+    float share = 1.0; // of the pixel's light that the path stands for
     bool goesOn = false;
     Sequence sequence = Sequence(0, 0);
     uint depth = 0;
@@ -402,7 +401,8 @@ void main()
         if (++number < samplesInBatch) {
             next = NEXT_SAMPLE;
         } else {
-            AddBatch(place, sum / float(number), float(interfaces) / float(number), float(rays) / float(number));
+            float scale = frame.cameraIndex * frame.cameraIndex;
+            AddBatch(place, scale * sum / float(number), float(interfaces) / float(number), float(rays) / float(number));
             next = NEXT_PIXEL;
         }
     }

@@ -68,7 +68,11 @@ impl Resources {
                 advice: "remove triangles that are millions of times smaller than the others",
             });
         }
-        let (materials, albedos) = materials(scene, plan, &view);
+        let (mut materials, albedos) = materials(scene, plan, &view);
+        if materials.is_empty() {
+            // Shaders may read the first one before they know that nothing is there.
+            materials.push(MaterialRecord::default());
+        }
         let lights = lights(scene, &view);
         let single = Panorama::new(1, 1, vec![[1.0; 3]]);
         let (panorama, is_image) = match &scene.environment.light {

@@ -24,6 +24,18 @@ fn smooth_bodies_are_white_to_the_bit() {
     validated.verdict();
 }
 
+/// Radiance in glass is that of the world times the square of its index.
+#[test]
+fn from_inside_of_glass_the_world_is_brighter() {
+    let Some(validated) = Validated::open() else { return };
+    let mut scene = in_white(scene([Part::glass(icosphere(5), 1.5)]));
+    scene.camera.position = DVec3::new(0.1, 0.2, 0.3);
+    let found = picture(&validated, &scene, Shot { samples: 32, depth: 256, ..Shot::default() });
+    let worst = found.radiance.iter().map(|value| (*value - 2.25).abs().max_element()).fold(0.0, f64::max);
+    assert!(worst < 1e-5, "{worst:e}");
+    validated.verdict();
+}
+
 /// What facets lose is given back: 1 within a per cent, whatever roughness and index.
 #[test]
 fn rough_bodies_are_white() {
