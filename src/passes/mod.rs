@@ -10,6 +10,7 @@ mod counts;
 mod display;
 mod environment;
 mod geometry;
+mod materials;
 mod path;
 mod probe;
 mod resources;
