@@ -189,7 +189,7 @@ fn warn_of_missing_uvs(
         let Surface::Opaque(Opaque { base_color_texture: Some(texture), .. }) = material.surface else { continue };
         if mesh.uvs.is_empty() && told.insert((object.mesh, object.material)) {
             warnings.push(format!(
-                "{}: has no texture coordinates; material {:?} shows the bottom left corner of {} all over it",
+                "{}: has no texture coordinates; material {:?} shows the corner of {} all over it",
                 mesh.name,
                 material.name,
                 textures[texture].name()

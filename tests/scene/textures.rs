@@ -173,7 +173,7 @@ fn a_mesh_without_coordinates_is_told_when_it_wears_a_texture() {
     // Once, however many objects do.
     assert_eq!(
         warnings(&[object("body.obj", "m"), object("body.obj", "m"), object("painted.obj", "m")]),
-        ["body.obj: has no texture coordinates; material \"m\" shows the bottom left corner of sky.png all over it"]
+        ["body.obj: has no texture coordinates; material \"m\" shows the corner of sky.png all over it"]
     );
     assert!(warnings(&[object("body.obj", "plain"), object("painted.obj", "m")]).is_empty());
 }
