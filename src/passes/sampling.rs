@@ -53,7 +53,7 @@ pub(super) fn rounds(plan: &Plan) -> Box<dyn Iterator<Item = Round>> {
 }
 
 /// Batches that the means of a pixel's samples should come from: what tells their standard error within a few per cent.
-const BATCHES: u32 = 32;
+const BATCHES: u32 = 16;
 
 /// Samples of a batch where it is not known how many there will be.
 const OPEN_BATCH: u32 = 4;
