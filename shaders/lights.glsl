@@ -13,7 +13,6 @@
 #include "pixel.glsl"
 #include "records.glsl"
 #include "skylight.glsl"
-#include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 

@@ -80,8 +80,8 @@ impl RenderCommand {
             let (model, names) = (plan.model.name(), plan.approximate.names().join(", "));
             talk.note(&format!("note: model {model} approximates {names}; see docs/tree.md"));
         }
-        let overlapping = scene.bodies_at_one_place();
-        if plan.model.traces() && overlapping > MOST_BODIES {
+        let overlapping = if plan.model.traces() { scene.bodies_at_one_place() } else { 0 };
+        if overlapping > MOST_BODIES {
             talk.note(&format!(
                 "warning: {overlapping} bodies may overlap at one place; of more than {MOST_BODIES} the lowest in rank are lost"
             ));

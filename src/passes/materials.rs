@@ -71,7 +71,7 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<Materia
     let record = |material: &Material| {
         let glass = match &material.surface {
             Surface::Dielectric(glass) => glass,
-            Surface::Opaque(opaque) => return opaque_record(scene, opaque),
+            Surface::Opaque(opaque) => return opaque_record(scene, plan, opaque),
         };
         let &Dielectric { ior, roughness, .. } = glass;
         let (mut albedo_table, mut albedo_tables) = (0, 0);
@@ -117,9 +117,10 @@ fn dispersion(glass: &Dielectric) -> f32 {
     }
 }
 
-fn opaque_record(scene: &Scene, opaque: &Opaque) -> MaterialRecord {
+fn opaque_record(scene: &Scene, plan: &Plan, opaque: &Opaque) -> MaterialRecord {
     // Of an image its mean, for those who do not look closer.
-    let base_color = opaque.base_color_texture.map_or(opaque.base_color, |texture| mean(&scene.textures[texture]));
+    let texture = opaque.base_color_texture.filter(|_| plan.effects.contains(Effect::Opaque));
+    let base_color = texture.map_or(opaque.base_color, |texture| mean(&scene.textures[texture]));
     MaterialRecord {
         base_color: base_color.as_vec3(),
         roughness: opaque.roughness as f32,

@@ -247,8 +247,9 @@ fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) ->
 fn levels(gpu: &Gpu, panorama: &Panorama, scene: &Scene, plan: &Plan) -> u32 {
     let fits = panorama.height + panorama.height / 2 <= gpu.max_image_side();
     let opaque = plan.effects.contains(Effect::Opaque);
-    let needed =
-        plan.footprints || opaque || plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);
+    let rough = plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);
+    // Paths average by being many.
+    let needed = plan.model != Model::Path && (plan.footprints || opaque || rough);
     if needed && fits { panorama.width.min(panorama.height).ilog2() + 1 } else { 1 }
 }
 
