@@ -10,12 +10,15 @@
 #include "camera.glsl"
 #include "compensation.glsl"
 #include "effects.glsl"
+#include "emitters.glsl"
 #include "environment.glsl"
 #include "media.glsl"
 #include "opaque.glsl"
+#include "pane.glsl"
 #include "rough.glsl"
 #include "skylight.glsl"
 #include "sobol.glsl"
+#include "spectrum.glsl"
 #include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -42,9 +45,10 @@ struct Ray {
     vec3 origin;
     vec3 direction;
     vec3 throughput;
-    float reach;      // distance of the point light at its end; infinite: none
+    float reach;      // distance of the light at its end; infinite: the environment
     Whereabouts at;
     Found left;
+    Found aim;        // the triangle that shines at its end
     uint passed;      // boundaries in a row between equal indices
 };
 
@@ -74,6 +78,7 @@ float PowerHeuristic(float pdf, float other)
 // An interface that a path has met, in the local frame.
 struct Met {
     bool isOpaque;
+    bool isPane;
     OpaqueSurface surface;
     float alpha;
     float etaI;
@@ -91,10 +96,12 @@ struct Worth {
 Worth Evaluate(Met met, vec3 wo)
 {
     if (met.isOpaque) return Worth(EvaluateOpaque(met.surface, met.wi, wo), OpaquePdf(met.surface, met.wi, wo));
-    RoughValue rough = EvaluateRough(met.wi, wo, met.alpha, met.etaI, met.etaT);
+    RoughValue rough;
+    if (met.isPane) rough = EvaluatePane(met.wi, wo, met.alpha, met.etaI, met.etaT);
+    else rough = EvaluateRough(met.wi, wo, met.alpha, met.etaI, met.etaT);
     bool reflected = wo.z > 0.0;
     if (reflected ? !REFLECTION : !TRANSMISSION) return Worth(vec3(0.0), rough.pdf);
-    float ratio = reflected ? 1.0 : met.etaT / met.etaI;
+    float ratio = reflected || met.isPane ? 1.0 : met.etaT / met.etaI;
     return Worth(vec3(rough.value * met.scale * ratio * ratio), rough.pdf);
 }
 
@@ -119,10 +126,12 @@ Next SampleOpaque(OpaqueSurface surface, vec3 wi, vec2 u, float choice)
 Next SampleNext(Met met, vec2 u, float choice)
 {
     if (met.isOpaque) return SampleOpaque(met.surface, met.wi, u, choice);
-    RoughSample rough = SampleRough(met.wi, met.alpha, met.etaI, met.etaT, vec3(u, choice));
+    RoughSample rough;
+    if (met.isPane) rough = SamplePane(met.wi, met.alpha, met.etaI, met.etaT, vec3(u, choice));
+    else rough = SampleRough(met.wi, met.alpha, met.etaI, met.etaT, vec3(u, choice));
     bool reflected = rough.wo.z > 0.0;
     if (reflected ? !REFLECTION : !TRANSMISSION) rough.weight = 0.0;
-    float ratio = reflected ? 1.0 : met.etaT / met.etaI;
+    float ratio = reflected || met.isPane ? 1.0 : met.etaT / met.etaI;
     return Next(rough.wo, vec3(rough.weight * met.scale * ratio * ratio), rough.pdf);
 }
 
@@ -131,21 +140,25 @@ bool IsRough(Material material)
     return material.roughness > SMOOTH_ROUGHNESS;
 }
 
-Met MetAt(Material material, Arrival arrival, bool isOpaque, vec3 wi, float etaI, float etaT)
+Met MetAt(Material material, Arrival arrival, Crossing crossing, vec3 wi)
 {
     Met met;
-    met.isOpaque = isOpaque;
+    met.isOpaque = crossing.isOpaque;
+    met.isPane = crossing.isPane;
     met.surface = OpaqueSurface(vec3(0.0), vec3(0.0), 0.0, 1.0);
-    if (isOpaque) {
+    if (met.isOpaque) {
         vec3 color = BaseColor(material, arrival.found, arrival.weights, mat2(0.0));
         met.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
     }
     met.alpha = material.roughness * material.roughness;
-    met.etaI = etaI;
-    met.etaT = etaT;
+    met.etaI = crossing.etaI;
+    met.etaT = crossing.etaT;
     met.wi = normalize(wi);
     met.scale = 1.0;
-    if (ENERGY_COMPENSATION && !isOpaque) met.scale = RoughCompensation(RoughTable(material.albedoTables, etaI, etaT), met.wi.z);
+    if (ENERGY_COMPENSATION && !met.isOpaque) {
+        uint table = met.isPane ? material.albedoTable : RoughTable(material.albedoTables, met.etaI, met.etaT);
+        met.scale = RoughCompensation(table, met.wi.z);
+    }
     return met;
 }
 
@@ -169,6 +182,16 @@ void AddBatch(ivec2 place, vec3 value, float interfaces, float rays)
     imageStore(counts, place, count);
 }
 
+// The kinds of lights that are looked for; each as often as the others.
+bool SeeksSky() { return ENVIRONMENT_IMAGE && SAMPLE_LIGHTS && cellCount.x != 0; }
+bool SeeksPoints() { return DIRECT_LIGHT && frame.lightCount > 0; }
+bool SeeksEmitters() { return OPAQUE && SAMPLE_LIGHTS && emitterCount > 0; }
+
+float ChanceOfKind()
+{
+    return 1.0 / max(float(SeeksSky()) + float(SeeksPoints()) + float(SeeksEmitters()), 1.0);
+}
+
 // A ray from an interface towards a light that it may see: false where there is none.
 bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pair, Ray path, out Ray light)
 {
@@ -176,40 +199,51 @@ bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pa
     light.left = arrival.found;
     light.passed = 0;
     light.reach = LARGEST_FLOAT;
-    bool sky = ENVIRONMENT_IMAGE && cellCount.x != 0 && SAMPLE_LIGHTS;
-    bool points = DIRECT_LIGHT && frame.lightCount > 0;
-    if (!sky && !points) return false;
-    uvec2 choice = PointBits(sequence, pair + PAIR_LIGHT_CHOICE);
+    float chance = ChanceOfKind();
+    vec2 choice = Point(sequence, pair + PAIR_LIGHT_CHOICE);
     vec2 u = Point(sequence, pair + PAIR_LIGHT);
-    // Half of the time one, half of the time the other, where there are both.
-    bool toSky = sky && (!points || choice.x < 0x80000000u);
-    if (sky && points) choice.x <<= 1;
-    float chance = sky && points ? 0.5 : 1.0;
-    vec3 radiance;
-    float pdf = 0.0;
-    if (toSky) {
+    uint kind = uint(choice.x / chance);
+    vec3 radiance = vec3(0.0);
+    float pdf = NO_PDF; // of a surface choosing it none
+    if (SeeksSky() && kind-- == 0) {
         SkySample chosen = SampleSky(u);
         light.direction = normalize(chosen.direction);
-        pdf = chosen.pdf;
+        pdf = chosen.pdf * chance;
         radiance = SampleEnvironment(light.direction, 0.0) / pdf;
-    } else {
-        uint high;
-        uint low;
-        umulExtended(choice.x, frame.lightCount, high, low);
-        vec3 toLight = lights[high].position - arrival.position;
+    } else if (SeeksPoints() && kind-- == 0) {
+        uint number = min(uint(choice.y * float(frame.lightCount)), frame.lightCount - 1);
+        vec3 toLight = lights[number].position - arrival.position;
         light.reach = max(length(toLight), 1e-30);
         light.direction = toLight / light.reach;
-        radiance = lights[high].intensity * (float(frame.lightCount) / (light.reach * light.reach));
+        radiance = lights[number].intensity * (float(frame.lightCount) / (light.reach * light.reach * chance));
+    } else if (SeeksEmitters()) {
+        EmitterSample chosen = SampleEmitter(choice.y, u);
+        vec3 toLight = chosen.position - arrival.position;
+        light.reach = max(length(toLight), 1e-30);
+        light.direction = toLight / light.reach;
+        light.aim = chosen.found;
+        vec3 emission = materials[instances[chosen.found.instance].material].emission;
+        float cosine = dot(light.direction, chosen.faceNormal);
+        pdf = EmitterPdf(emission, light.reach, cosine) * chance;
+        radiance = emission * (abs(cosine) / (light.reach * light.reach * chosen.pdf * chance));
+    } else {
+        return false;
     }
     vec3 wo = light.direction * toWorld;
     // On the same side of the surface and of its interpolated normal.
     bool above = (dot(light.direction, arrival.faceNormal) > 0.0) != arrival.behind;
     if (above != (wo.z > 0.0)) return false;
     Worth worth = Evaluate(met, wo);
-    float weight = toSky && SAMPLE_SURFACES ? PowerHeuristic(pdf, worth.pdf) : 1.0;
-    light.throughput = path.throughput * worth.value * radiance * (weight / chance);
+    float weight = pdf != NO_PDF && SAMPLE_SURFACES ? PowerHeuristic(pdf, worth.pdf) : 1.0;
+    light.throughput = path.throughput * worth.value * radiance * weight;
     light.origin = LeaveFrom(arrival, light.direction);
     return Largest(abs(light.throughput)) > 0.0;
+}
+
+// The share of light that a surface's choice of a direction counts for, where it could have been the choice of lights, of density `other`.
+float WeightOfSurface(float pdf, float other)
+{
+    return SAMPLE_SURFACES ? PowerHeuristic(pdf, other * ChanceOfKind()) : 0.0;
 }
 
 // What the next ray is.
@@ -228,7 +262,7 @@ void main()
     uint rays = 0;
 
     Whereabouts atCamera = Whereabouts(frame.cameraMedium, Bodies(frame.cameraBodies));
-    Ray path = Ray(vec3(0.0), vec3(0.0, 0.0, -1.0), vec3(0.0), LARGEST_FLOAT, atCamera, NOWHERE, 0);
+    Ray path = Ray(vec3(0.0), vec3(0.0, 0.0, -1.0), vec3(0.0), LARGEST_FLOAT, atCamera, NOWHERE, NOWHERE, 0);
     Ray light = path;
     bool toLight = false;
     Waiting waiting = Waiting(path, false);
@@ -238,7 +272,8 @@ void main()
     Sequence sequence = Sequence(0, 0);
     uint depth = 0;
     float pdf = NO_PDF;
-    uint line = 0;
+    float travelled = 0.0; // from the interface before
+    Wavelength wavelength = Wavelength(D_LINE, vec3(1.0));
     bool isColored = false;
 
     for (;;) {
@@ -254,11 +289,12 @@ void main()
         if (next == NEXT_SAMPLE) {
             sequence.index = number;
             vec2 pixel = vec2(place) + Point(sequence, PAIR_PIXEL);
-            path = Ray(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), LARGEST_FLOAT, atCamera, NOWHERE, 0);
-            line = DISPERSION ? uint(Point(sequence, PAIR_WAVELENGTH).x * float(wavelengths)) : 0;
+            path = Ray(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), LARGEST_FLOAT, atCamera, NOWHERE, NOWHERE, 0);
+            if (DISPERSION) wavelength = ChooseWavelength(Point(sequence, PAIR_WAVELENGTH).x);
             isColored = false;
             depth = 0;
             pdf = NO_PDF;
+            travelled = 0.0;
             toLight = false;
             waits = false;
             share = 1.0;
@@ -275,13 +311,13 @@ void main()
         Arrival arrival;
         Material material = materials[0];
         if (meets) arrival = ArriveAt(found, ray.origin, ray.direction);
-        if (meets && isLight) meets = arrival.distance < ray.reach;
+        if (meets && isLight) meets = arrival.distance < ray.reach && found != ray.aim;
         Boundary boundary = Boundary(ray.at, ray.at);
         Crossing crossing = Crossing(boundary, 1.0, 1.0, false, false, false);
         bool disperses = false;
         if (meets) {
             material = materials[instances[found.instance].material];
-            crossing = CrossingOf(found, material, arrival.behind, ray.at, DISPERSION ? spectrum[line].w : D_LINE, disperses);
+            crossing = CrossingOf(found, material, arrival.behind, ray.at, wavelength.nanometres, disperses);
             boundary = crossing.boundary;
             ray.throughput *= Absorbed(boundary.before.medium, arrival.distance);
         }
@@ -305,17 +341,23 @@ void main()
             bool isSeen = frame.environmentVisible != 0 || depth > 0;
             if (isSeen) {
                 float weight = 1.0;
-                if (ENVIRONMENT_IMAGE && SAMPLE_LIGHTS && cellCount.x != 0 && pdf > 0.0) {
-                    weight = SAMPLE_SURFACES ? PowerHeuristic(pdf, SkyPdf(ray.direction)) : 0.0;
-                }
+                if (SeeksSky() && pdf > 0.0) weight = WeightOfSurface(pdf, SkyPdf(ray.direction));
                 sum += weight * ray.throughput * SampleEnvironment(ray.direction, 0.0);
             }
             goesOn = false;
         } else if (passes) {
             path = ray;
+            travelled += arrival.distance;
             goesOn = !ends;
         } else {
-            if (isOpaque) sum += ray.throughput * material.emission / (crossing.etaI * crossing.etaI);
+            if (isOpaque && Largest(material.emission) > 0.0) {
+                float weight = 1.0;
+                if (SeeksEmitters() && pdf > 0.0) {
+                    float cosine = dot(ray.direction, arrival.faceNormal);
+                    weight = WeightOfSurface(pdf, EmitterPdf(material.emission, travelled + arrival.distance, cosine));
+                }
+                sum += weight * ray.throughput * material.emission / (crossing.etaI * crossing.etaI);
+            }
             goesOn = depth < frame.maxDepth;
         }
 
@@ -323,7 +365,7 @@ void main()
         if (scatters && (isOpaque || goesOn)) ++interfaces;
         if (scatters && goesOn) {
             if (DISPERSION && disperses && !isColored) {
-                ray.throughput *= float(wavelengths) * spectrum[line].rgb;
+                ray.throughput *= wavelength.color;
                 isColored = true;
             }
             uint pair = PAIRS_BEFORE + PAIRS_OF_INTERFACE * depth;
@@ -336,16 +378,16 @@ void main()
             vec3 weight = vec3(1.0);
             pdf = NO_PDF;
             bool reflected = false;
-            bool isRough = ROUGHNESS && !isOpaque && !crossing.isPane && IsRough(material);
+            bool isRough = ROUGHNESS && !isOpaque && IsRough(material);
             if (isOpaque || isRough) {
                 mat3 toWorld = BasisAround(normal);
-                Met met = MetAt(material, arrival, isOpaque, wi * toWorld, crossing.etaI, crossing.etaT);
+                Met met = MetAt(material, arrival, crossing, wi * toWorld);
                 toLight = AskLight(met, toWorld, arrival, sequence, pair, ray, light);
                 if (toLight) {
                     bool through = dot(light.direction, faceNormal) < 0.0;
                     light.at = through ? boundary.beyond : boundary.before;
-                    // Light of a point light is given as it is in the medium that it lies in.
-                    float index = through ? crossing.etaT : crossing.etaI;
+                    // Light of points and of surfaces is given as it is in the medium that they lie in.
+                    float index = through && !crossing.isPane ? crossing.etaT : crossing.etaI;
                     if (light.reach < LARGEST_FLOAT) light.throughput /= index * index;
                 }
                 Next sampled = SampleNext(met, Point(sequence, pair + PAIR_DIRECTION), choice.x);
@@ -360,7 +402,7 @@ void main()
             } else {
                 Refraction refraction = Refract(wi, normal, crossing.etaI, crossing.etaT);
                 float reflectance = refraction.crossed.reflectance;
-                if (crossing.isPane && !refraction.crossed.total) reflectance = 2.0 * reflectance / (1.0 + reflectance);
+                if (crossing.isPane) reflectance = PaneReflectance(reflectance);
                 reflected = refraction.crossed.total || choice.x < reflectance;
                 vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
                 vec3 wt = direction;
@@ -369,7 +411,8 @@ void main()
                 if (depth == 1 && REFLECTION && TRANSMISSION && !refraction.crossed.total) {
                     reflected = true;
                     weight = vec3(reflectance);
-                    waiting.ray = Ray(LeaveFrom(arrival, wt), wt, ray.throughput * (1.0 - reflectance), LARGEST_FLOAT, boundary.beyond, found, 0);
+                    waiting.ray = Ray(LeaveFrom(arrival, wt), wt, ray.throughput * (1.0 - reflectance), LARGEST_FLOAT, boundary.beyond, found,
+                        NOWHERE, 0);
                     waiting.isColored = isColored;
                     share = reflectance;
                     waits = true;
@@ -377,7 +420,8 @@ void main()
                 direction = reflected ? wr : wt;
             }
             path = Ray(LeaveFrom(arrival, direction), direction, ray.throughput * weight, LARGEST_FLOAT,
-                reflected ? boundary.before : boundary.beyond, found, 0);
+                reflected ? boundary.before : boundary.beyond, found, NOWHERE, 0);
+            travelled = 0.0;
             float size = Largest(abs(path.throughput));
             goesOn = size > 0.0;
             if (depth > ROULETTE_DEPTH && size < share) {
@@ -395,6 +439,7 @@ void main()
             share = 1.0 - share;
             depth = 1;
             pdf = NO_PDF;
+            travelled = 0.0;
             goesOn = true;
             continue;
         }

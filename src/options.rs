@@ -207,6 +207,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "SECONDS", value_parser = range::positive)]
     pub time_budget: Option<f64>,
 
+    /// path: save what is rendered to FILE from time to time, and go on from there if FILE is of the same render
+    #[arg(long, value_name = "FILE")]
+    pub checkpoint: Option<PathBuf>,
+
     /// Seed of everything random [default: 0]
     #[arg(long, value_name = "N", value_parser = range::seed)]
     pub seed: Option<u64>,
@@ -302,6 +306,7 @@ impl RenderArgs {
             max_depth: self.max_depth.or(fallback.max_depth),
             tolerance: self.tolerance.or(fallback.tolerance),
             time_budget: self.time_budget.or(fallback.time_budget),
+            checkpoint: self.checkpoint.or(fallback.checkpoint),
             seed: self.seed.or(fallback.seed),
             effects: self.effects.or(fallback.effects),
             ior: self.ior.or(fallback.ior),

@@ -1,6 +1,7 @@
 //! What one render does: scene and options, with every default filled in and every conflict refused.
 
 use std::ops::RangeInclusive;
+use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::effects::{Effect, Effects};
@@ -44,6 +45,8 @@ pub struct Plan {
     pub aovs: Vec<Aov>,
     /// Effects that the model simulates by something simpler.
     pub approximate: Effects,
+    /// Where the render is saved from time to time, and goes on from.
+    pub checkpoint: Option<PathBuf>,
     /// Controls of the original's user interface.
     pub debug: DebugControls,
     /// Every option that was given, and the defaults of those that shape each picture.
@@ -144,6 +147,10 @@ impl Plan {
             let hint = "model single has no error estimate; use --samples or --time-budget";
             return Err(Error::Usage(format!("--tolerance: {hint}")));
         }
+        if args.checkpoint.is_some() && model != Model::Path {
+            let hint = format!("model {} has nothing to go on from; --model path has", model.name());
+            return Err(Error::Usage(format!("--checkpoint: {hint}")));
+        }
         let mut aovs = args.aov.clone().unwrap_or_default();
         aovs.sort();
         aovs.dedup();
@@ -191,6 +198,7 @@ impl Plan {
             tonemap: args.tonemap.unwrap_or_default(),
             aovs,
             approximate,
+            checkpoint: args.checkpoint.clone(),
             debug: DebugControls::new(args),
             options: args.clone().or(RenderArgs {
                 model: Some(model),

@@ -58,7 +58,10 @@ impl RenderCommand {
         scene.frame(f64::from(plan.size.width) / f64::from(plan.size.height));
         let options = &plan.options;
         let stats_file = options.stats.as_deref().map(OutputFile::new).transpose()?;
-        self.keep_apart(&output, stats_file.as_ref(), options)?;
+        let checkpoint = options.checkpoint.as_deref().map(OutputFile::new).transpose()?;
+        let outputs =
+            [("the image", Some(&output)), ("the stats", stats_file.as_ref()), ("the checkpoint", checkpoint.as_ref())];
+        self.keep_apart(outputs.into_iter().filter_map(|(what, file)| Some((what, file?))).collect(), options)?;
 
         let validation = options.validation == Some(true);
         let instance = Instance::new(validation)?;
@@ -93,6 +96,12 @@ impl RenderCommand {
         plan.budget = plan.budget.less(start.elapsed());
         let rendered = passes::render(&gpu, &scene, &plan, &mut |done| bar.set_position(done.into()))?;
         bar.finish_and_clear();
+        if rendered.resumed > 0 {
+            talk.note(&format!("note: went on from {} samples of the checkpoint", rendered.resumed));
+        }
+        for warning in &rendered.warnings {
+            talk.note(&format!("warning: {warning}"));
+        }
         if let Some(budget) = plan.options.time_budget.filter(|&budget| start.elapsed().as_secs_f64() > 1.05 * budget) {
             let (taken, samples) = (start.elapsed().as_secs_f64(), rendered.samples);
             let what = if samples == 1 { "set-up and one sample, the least," } else { "it" };
@@ -153,19 +162,19 @@ impl RenderCommand {
     }
 
     /// An output must not replace an input, nor another output.
-    fn keep_apart(&self, output: &OutputFile, stats: Option<&OutputFile>, options: &RenderArgs) -> Result<()> {
+    fn keep_apart(&self, outputs: Vec<(&str, &OutputFile)>, options: &RenderArgs) -> Result<()> {
         let inputs = [self.scene.as_deref(), options.env.as_deref()];
-        let is_input = |file: &OutputFile| inputs.into_iter().flatten().any(|input| file.replaces(input));
-        if let Some(file) = [Some(output), stats].into_iter().flatten().find(|file| is_input(file)) {
-            let message = "is read by this render and would be replaced; name another file";
-            return Err(Error::input(file.path(), 0, message));
-        }
-        match stats {
-            Some(stats) if output.replaces(stats.path()) => {
-                Err(Error::input(stats.path(), 0, "is to hold both the image and the stats; name two files"))
+        for (i, &(what, file)) in outputs.iter().enumerate() {
+            if inputs.into_iter().flatten().any(|input| file.replaces(input)) {
+                let message = "is read by this render and would be replaced; name another file";
+                return Err(Error::input(file.path(), 0, message));
             }
-            _ => Ok(()),
+            if let Some((other, _)) = outputs[..i].iter().find(|(_, other)| other.replaces(file.path())) {
+                let message = format!("is to hold both {other} and {what}; name two files");
+                return Err(Error::input(file.path(), 0, message));
+            }
         }
+        Ok(())
     }
 }
 

@@ -199,6 +199,11 @@ impl Image {
         self.extent.height
     }
 
+    /// Bytes of all texels.
+    pub fn bytes(&self) -> u64 {
+        self.texel_bytes() * u64::from(self.width()) * u64::from(self.height())
+    }
+
     /// The only level and layer.
     pub(super) fn range(&self) -> vk::ImageSubresourceRange {
         let depth = self.format == Format::Depth32;

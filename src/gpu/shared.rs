@@ -8,6 +8,14 @@ use glam::{DAffine3, DMat3, DMat4, DVec3, Vec2, Vec3};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 pub struct Matrix4x3([[f32; 4]; 4]);
 
+impl Matrix4x3 {
+    /// The map without its translation.
+    pub fn linear(&self) -> DMat3 {
+        let [x, y, z, _] = self.0.map(|[x, y, z, _]| Vec3::new(x, y, z).as_dvec3());
+        DMat3::from_cols(x, y, z)
+    }
+}
+
 impl From<DAffine3> for Matrix4x3 {
     fn from(map: DAffine3) -> Self {
         let column = |v: DVec3| [v.x as f32, v.y as f32, v.z as f32, 0.0];

@@ -35,6 +35,11 @@ pub fn color_matching(wavelength: f64) -> DVec3 {
     )
 }
 
+/// Luminance of a colour in linear Rec. 709: ITU-R BT.709.
+pub fn luminance(color: DVec3) -> f64 {
+    color.dot(DVec3::new(0.2126, 0.7152, 0.0722))
+}
+
 /// The colour of light of one wavelength in linear Rec. 709, scaled so that all of them together, evenly over
 /// [`VISIBLE`], are white: the mean over it is 1 in each channel. Outside of the gamut channels are below 0.
 pub fn color_of(wavelength: f64) -> DVec3 {
@@ -87,6 +92,25 @@ mod tests {
         assert!((color_matching(450.0).z - 1.77211).abs() < 0.03);
         let area: DVec3 = (360..830).map(|nanometre| color_matching(f64::from(nanometre))).sum();
         assert!((area - DVec3::splat(106.86)).abs().max_element() < 1.0, "{area}");
+    }
+
+    /// `shaders/spectrum.glsl` chooses by bands of the spectrum.
+    #[test]
+    fn shaders_choose_wavelengths_by_the_length_of_their_colours() {
+        let shader = include_str!("../../shaders/spectrum.glsl");
+        let list = shader.split("float[](").nth(1).and_then(|rest| rest.split(')').next()).expect("a list");
+        let edges: Vec<f64> = list.split(',').map(|edge| edge.trim().parse().expect("a number")).collect();
+        let [low, high] = VISIBLE;
+        assert!(shader.contains(&format!("SHORTEST = {low:?};")) && shader.contains(&format!("LONGEST = {high:?};")));
+        let steps = 3200;
+        let at = |i: usize| low + (i as f64 + 0.5) / steps as f64 * (high - low);
+        let lengths: Vec<f64> = (0..steps).map(|i| color_of(at(i)).length()).collect();
+        let whole: f64 = lengths.iter().sum();
+        let bands = edges.len() - 1;
+        for (i, band) in lengths.chunks(steps / bands).enumerate() {
+            let share = band.iter().sum::<f64>() / whole;
+            assert!((edges[i + 1] - edges[i] - share).abs() < 3e-4, "band {i}: {share}");
+        }
     }
 
     #[test]

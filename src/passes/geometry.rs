@@ -106,6 +106,15 @@ impl Geometry {
         all
     }
 
+    /// The corners of a triangle, counted through all meshes, in its mesh's space; of geometry for tracing.
+    pub(super) fn corners_of(&self, triangle: u32) -> [DVec3; 3] {
+        let first = 3 * triangle as usize;
+        [0, 1, 2].map(|corner| {
+            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(self.corners[4 * (first + corner) + axis]));
+            DVec3::new(x, y, z)
+        })
+    }
+
     fn add(&mut self, mesh: &Mesh, trace: Option<Trace>) -> Place {
         let bounds = mesh.bounds();
         let center = bounds.center();

@@ -15,6 +15,9 @@ use crate::options::Model;
 use crate::plan::Plan;
 use crate::scene::{Dielectric, Dispersion, Material, Opaque, Scene, Sellmeier, Surface, Texels, Texture};
 
+/// An index so high that an interface reflects everything.
+const MIRROR: f64 = 1e12;
+
 /// Tables of what single bounces between facets lose, each interface's once: `shaders/compensation.glsl`.
 struct Albedos {
     /// Nothing stands at 0, which says that there is no table.
@@ -78,6 +81,10 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<Materia
         if plan.effects.contains(Effect::EnergyCompensation) && is_rough(material) {
             let alpha = roughness * roughness;
             match plan.model {
+                Model::Path if glass.thin_walled => {
+                    // Both lobes of a pane are masked as those of a mirror, and lose the same.
+                    albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: MIRROR });
+                }
                 Model::Path => albedo_tables = albedos.pairs(alpha, ior, &others),
                 _ => albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: ior }),
             }

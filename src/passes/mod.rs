@@ -6,8 +6,10 @@
 mod accumulate;
 mod aov;
 mod bvh;
+mod checkpoint;
 mod counts;
 mod display;
+mod emitters;
 mod environment;
 mod geometry;
 mod materials;
@@ -33,10 +35,11 @@ use crate::scene::Scene;
 
 use accumulate::Accumulate;
 use aov::AovPass;
+use checkpoint::{Checkpoint, Progress};
 use display::Display;
 use environment::EnvironmentPass;
 use geometry::Draw;
-use path::{Path, PathTargets};
+use path::{AfterRows, Path, PathTargets};
 use resources::Resources;
 use sampling::Round;
 use single::Single;
@@ -73,6 +76,10 @@ pub struct Rendered {
     pub acceleration: Option<Duration>,
     /// Host time until every pipeline had run once: drivers compile at the first use.
     pub pipelines: Duration,
+    /// Samples per pixel that a checkpoint held already.
+    pub resumed: u32,
+    /// What went wrong beside the picture, that a user should hear of.
+    pub warnings: Vec<String>,
 }
 
 /// Whether `gpu` can do what `plan` says.
@@ -102,7 +109,7 @@ fn trace_of(gpu: &Gpu, plan: &Plan) -> Result<Option<Trace>> {
 }
 
 /// Renders `scene` as `plan` says. `progress` hears how many samples are done.
-pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u32)) -> Result<Rendered> {
+pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u32)) -> crate::Result<Rendered> {
     let start = Instant::now();
     check(gpu, plan)?;
     let mut commands = Commands::new(gpu)?;
@@ -114,16 +121,48 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
     let set_up = start.elapsed();
 
     let targets = Targets::new(gpu, plan.size, &resources, plan.model)?;
+    let state = targets.state();
+    let mut checkpoint = match &plan.checkpoint {
+        Some(path) => Some(Checkpoint::new(path, checkpoint::key(gpu, plan, trace, resources.fingerprint))?),
+        None => None,
+    };
+    let begun = match &checkpoint {
+        Some(checkpoint) => checkpoint.resume(&mut commands, &state)?,
+        None => Progress::default(),
+    };
     let mut times = Times::default();
-    let mut samples = 0;
+    let (mut samples, mut resumed) = (0, 0);
+    let mut done = begun;
+    let mut is_enough = begun.rounds > 0 && is_precise(&mut commands, &targets, plan, begun.rounds)?;
     for (rounds, round) in (1..).zip(sampling::rounds(plan)) {
-        times.add(passes.sample(&mut commands, &resources, &targets, &resources.draws, round.push)?);
-        samples += round.samples;
-        progress(samples);
-        if is_spent(plan.budget, set_up, start.elapsed(), rounds) || is_precise(&mut commands, &targets, plan, rounds)?
-        {
+        if rounds <= begun.rounds {
+            (samples, resumed) = (samples + round.samples, resumed + round.samples);
+            continue;
+        }
+        if is_enough {
             break;
         }
+        let first_row = if rounds == begun.rounds + 1 { begun.rows } else { 0 };
+        let push = SamplePush { first_row, ..round.push };
+        let mut after = |commands: &mut Commands, rows| match &mut checkpoint {
+            Some(checkpoint) if checkpoint.is_due() => {
+                checkpoint.save(commands, &state, Progress { rounds: rounds - 1, rows })
+            }
+            _ => Ok(()),
+        };
+        times.add(passes.sample(&mut commands, &resources, &targets, &resources.draws, push, &mut after)?);
+        samples += round.samples;
+        progress(samples);
+        done = Progress { rounds, rows: 0 };
+        is_enough = is_spent(plan.budget, set_up, start.elapsed(), rounds - begun.rounds)
+            || is_precise(&mut commands, &targets, plan, rounds)?;
+    }
+    let mut warnings = Vec::new();
+    if let Some(checkpoint) = &mut checkpoint {
+        if done != begun {
+            checkpoint.save(&mut commands, &state, done)?;
+        }
+        warnings.extend(checkpoint.failure.take().map(|error| error.in_full()));
     }
 
     let (display, time) = passes.display.run(&mut commands, &targets, plan)?;
@@ -148,6 +187,8 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
         upload,
         acceleration: resources.acceleration,
         pipelines: set_up - upload,
+        resumed,
+        warnings,
     })
 }
 
@@ -176,7 +217,7 @@ struct Raster {
 
 impl Passes {
     /// Makes every pipeline and runs each once on a few pixels, so that no time of a pass holds its compilation.
-    fn new(commands: &mut Commands, resources: &Resources, plan: &Plan, trace: Option<Trace>) -> Result<Self> {
+    fn new(commands: &mut Commands, resources: &Resources, plan: &Plan, trace: Option<Trace>) -> crate::Result<Self> {
         let gpu = commands.gpu().clone();
         let small = Size { width: 16, height: 16 };
         let targets = Targets::new(&gpu, small, resources, plan.model)?;
@@ -206,7 +247,7 @@ impl Passes {
             resources.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect();
         if let Some(Round { push, .. }) = sampling::rounds(plan).next() {
             let push = SamplePush { samples_in_batch: 1, ..push };
-            passes.sample(commands, resources, &targets, &few, push)?;
+            passes.sample(commands, resources, &targets, &few, push, &mut |_, _| Ok(()))?;
         }
         passes.display.run(commands, &targets, plan)?;
         if let Some(aov) = &passes.aov {
@@ -222,15 +263,16 @@ impl Passes {
         targets: &Targets,
         draws: &[Draw],
         push: SamplePush,
-    ) -> Result<Vec<PassTime>> {
+        after: &mut AfterRows<'_>,
+    ) -> crate::Result<Vec<PassTime>> {
         match (&mut self.model, &targets.model) {
-            (ModelPass::Tree(pass), ModelTargets::Tree(tree)) => pass.sample(commands, targets, tree, push),
-            (ModelPass::Path(pass), ModelTargets::Path(path)) => pass.batch(commands, targets, path, push),
-            (ModelPass::Raster(raster), _) => commands.run(|cmd| {
+            (ModelPass::Tree(pass), ModelTargets::Tree(tree)) => Ok(pass.sample(commands, targets, tree, push)?),
+            (ModelPass::Path(pass), ModelTargets::Path(path)) => pass.batch(commands, targets, path, push, after),
+            (ModelPass::Raster(raster), _) => Ok(commands.run(|cmd| {
                 cmd.timed("single", |cmd| raster.single.record(cmd, resources, targets, draws, push));
                 cmd.timed("environment", |cmd| raster.environment.record(cmd, resources, targets, push));
                 cmd.timed("accumulate", |cmd| raster.accumulate.record(cmd, targets, push.sample_index));
-            }),
+            })?),
             // A pass comes with its own targets.
             (ModelPass::Tree(_) | ModelPass::Path(_), _) => Ok(Vec::new()),
         }
@@ -258,7 +300,8 @@ impl Targets {
     fn new(gpu: &Gpu, Size { width, height }: Size, resources: &Resources, model: Model) -> Result<Self> {
         let image = |name, format, uses| Image::new(gpu, &ImageDesc { name, width, height, format, uses });
         let radiance = Arc::new(image("radiance", RADIANCE, &[Use::ColorTarget, Use::Sampled])?);
-        let mean = Arc::new(image("mean", RADIANCE, &[Use::Storage, Use::Sampled, Use::CopySource])?);
+        let uses = &[Use::Storage, Use::Sampled, Use::CopySource, Use::CopyTarget];
+        let mean = Arc::new(image("mean", RADIANCE, uses)?);
         let depth = image("depth", Format::Depth32, &[Use::DepthTarget])?;
         let accumulation = vec![Bind::Sampled(radiance.clone()), Bind::Storage(mean.clone())];
         let model = match model {
@@ -274,6 +317,14 @@ impl Targets {
             mean,
             depth,
         })
+    }
+
+    /// Everything that rounds move, of models that can be interrupted.
+    fn state(&self) -> Vec<&Image> {
+        match &self.model {
+            ModelTargets::Path(path) => path.state(&self.mean).to_vec(),
+            ModelTargets::Tree(_) | ModelTargets::Raster => Vec::new(),
+        }
     }
 
     /// What the model counted; `mean` are the bytes of that image.

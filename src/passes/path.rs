@@ -14,6 +14,9 @@ use crate::options::Trace;
 /// Pixels of a row that one invocation takes: `PIXELS` of `shaders/path.glsl`.
 const PIXELS: u32 = 4;
 
+/// Hears how many rows of a batch are done.
+pub(super) type AfterRows<'a> = dyn FnMut(&mut Commands, u32) -> crate::Result<()> + 'a;
+
 pub(super) struct Path {
     pipeline: ComputePipeline,
     slices: Slices,
@@ -29,13 +32,19 @@ pub(super) struct PathTargets {
 }
 
 impl PathTargets {
+    /// All that a batch moves.
+    pub(super) fn state<'t>(&'t self, mean: &'t Image) -> [&'t Image; 3] {
+        [mean, &self.counts, &self.spread]
+    }
+
     pub(super) fn new(gpu: &Gpu, resources: &Resources, mean: &Arc<Image>) -> Result<Self> {
         let (width, height) = (mean.width(), mean.height());
-        let uses = &[Use::Storage, Use::CopySource];
+        let uses = &[Use::Storage, Use::CopySource, Use::CopyTarget];
         let image = |name| Image::new(gpu, &ImageDesc { name, width, height, format: RADIANCE, uses }).map(Arc::new);
         let (counts, spread) = (image("counts")?, image("spread")?);
         let mut bindings = resources.traced.clone();
         bindings.extend([mean, &counts, &spread].map(|image| Bind::Storage(image.clone())));
+        bindings.push(resources.emitters.clone());
         Ok(Self { group: BindGroup::new(gpu, "path", bindings)?, counts, spread })
     }
 }
@@ -51,22 +60,23 @@ impl Path {
         Ok(Self { pipeline, slices: Slices::new() })
     }
 
-    /// One batch of samples of every pixel, in slices of rows.
+    /// One batch of samples of every pixel from row `push.first_row` on, in slices of rows; `after` hears of each how many rows are done.
     pub(super) fn batch(
         &mut self,
         commands: &mut Commands,
         targets: &Targets,
         path: &PathTargets,
         push: SamplePush,
-    ) -> Result<Vec<PassTime>> {
+        after: &mut AfterRows<'_>,
+    ) -> crate::Result<Vec<PassTime>> {
         let (width, height) = (targets.mean.width(), targets.mean.height());
         let mut times = Vec::new();
-        let mut first_row = 0;
+        let mut first_row = push.first_row;
         while first_row < height {
             let rows = self.slices.next(height - first_row);
             let start = Instant::now();
             times.extend(commands.run(|cmd| {
-                for image in [&targets.mean, &path.counts, &path.spread] {
+                for image in path.state(&targets.mean) {
                     cmd.use_image(image, Use::Storage);
                 }
                 cmd.timed("path", |cmd| {
@@ -76,6 +86,7 @@ impl Path {
             })?);
             first_row += rows;
             self.slices.took(rows, start.elapsed(), height);
+            after(commands, first_row.min(height))?;
         }
         Ok(times)
     }

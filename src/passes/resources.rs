@@ -3,9 +3,12 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use bytemuck::NoUninit;
 use glam::DVec3;
 use half::f16;
+use xxhash_rust::xxh3::Xxh3;
 
+use super::emitters;
 use super::geometry::{Draw, Geometry};
 use super::materials::{is_rough, materials, texels};
 use super::skylight;
@@ -34,6 +37,8 @@ pub(super) struct Resources {
     pub(super) group: BindGroup,
     /// The same with what only traced models read.
     pub(super) traced: Vec<Bind>,
+    /// The table of what shines, for paths.
+    pub(super) emitters: Bind,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
@@ -43,6 +48,28 @@ pub(super) struct Resources {
     pub(super) opaque: bool,
     /// Host time that hierarchies took, if there are any.
     pub(super) acceleration: Option<Duration>,
+    /// A number that tells all of this from other scenes, if the plan has a use for it.
+    pub(super) fingerprint: Option<u128>,
+}
+
+/// Puts arrays on the device, and takes their fingerprint on the way.
+struct Upload<'c> {
+    commands: &'c mut Commands,
+    hash: Option<Xxh3>,
+}
+
+impl Upload<'_> {
+    fn hash<T: NoUninit>(&mut self, data: &[T]) {
+        if let Some(hash) = &mut self.hash {
+            hash.update(&(size_of_val(data) as u64).to_ne_bytes());
+            hash.update(bytemuck::cast_slice(data));
+        }
+    }
+
+    fn buffer<T: NoUninit>(&mut self, name: &str, data: &[T]) -> Result<Bind> {
+        self.hash(data);
+        Ok(Bind::Buffer(Arc::new(self.commands.upload_buffer(name, data)?)))
+    }
 }
 
 /// Groups that `shaders/trace_software.glsl` has room for.
@@ -75,7 +102,9 @@ impl Resources {
             Surroundings::Color(_) => (&single, false),
         };
         let levels = levels(commands.gpu(), panorama, scene, plan);
-        let environment = upload_panorama(commands, panorama, levels)?;
+        let mut upload = Upload { commands, hash: plan.checkpoint.is_some().then(Xxh3::new) };
+        let environment = upload_panorama(upload.commands, panorama, levels)?;
+        upload.hash(&panorama.texels);
         let ranked = ranked_materials(scene, &geometry);
         if ranked.len() > 1 << 16 {
             return Err(GpuError::TooLarge {
@@ -97,45 +126,53 @@ impl Resources {
             ..frame(scene, plan, &view, lights.len() as u32)
         };
         let texels = if plan.effects.contains(Effect::Textures) { texels(&scene.textures) } else { Vec::new() };
-        let buffers = vec![
-            commands.upload_buffer("frame", &[frame])?,
-            commands.upload_buffer("instances", &geometry.instances)?,
-            commands.upload_buffer("materials", &materials)?,
-            commands.upload_buffer("lights", &lights)?,
-            commands.upload_buffer("positions", &geometry.positions)?,
-            commands.upload_buffer("normals", &geometry.normals)?,
-            commands.upload_buffer("triangles", &geometry.triangles)?,
+        upload.hash(&[paths_frame(frame)]);
+        upload.commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
+        let mut bindings = vec![
+            Bind::Buffer(Arc::new(upload.commands.upload_buffer("frame", &[frame])?)),
+            upload.buffer("instances", &geometry.instances)?,
+            upload.buffer("materials", &materials)?,
+            upload.buffer("lights", &lights)?,
+            upload.buffer("positions", &geometry.positions)?,
+            upload.buffer("normals", &geometry.normals)?,
+            upload.buffer("triangles", &geometry.triangles)?,
         ];
-        commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
-        let buffer = |buffer| Bind::Buffer(Arc::new(buffer));
-        let mut bindings: Vec<_> = buffers.into_iter().map(buffer).collect();
         bindings.push(Bind::Sampled(Arc::new(environment)));
-        bindings.push(buffer(commands.upload_buffer("albedos", &albedos)?));
+        bindings.push(upload.buffer("albedos", &albedos)?);
         let mut traced = Vec::new();
         if trace.is_some() {
             traced.clone_from(&bindings);
-            let corners = commands.upload_buffer("corners of the triangles", &geometry.corners)?;
+            let corners = upload.commands.upload_buffer("corners of the triangles", &geometry.corners)?;
             let start = Instant::now();
             traced.push(match trace {
                 Some(Trace::Hardware) => {
-                    let built = AccelerationStructure::new(commands, &corners, &geometry.meshes, &geometry.placed)?;
+                    let (meshes, placed) = (&geometry.meshes, &geometry.placed);
+                    let built = AccelerationStructure::new(upload.commands, &corners, meshes, placed)?;
                     acceleration += start.elapsed();
                     Bind::Acceleration(Arc::new(built))
                 }
-                _ => buffer(commands.upload_buffer("nodes of the hierarchies", &geometry.nodes)?),
+                _ => upload.buffer("nodes of the hierarchies", &geometry.nodes)?,
             });
-            traced.push(buffer(corners));
-            traced.push(buffer(commands.upload_buffer("materials of the bodies", &ranked)?));
-            traced.push(buffer(commands.upload_buffer("texture coordinates", &geometry.uvs)?));
-            traced.push(buffer(commands.upload_buffer("texels", &texels)?));
+            traced.push(Bind::Buffer(Arc::new(corners)));
+            traced.push(upload.buffer("materials of the bodies", &ranked)?);
+            traced.push(upload.buffer("texture coordinates", &geometry.uvs)?);
+            traced.push(upload.buffer("texels", &texels)?);
             let rough = plan.model == Model::Path && plan.effects.contains(Effect::Roughness);
             let cells = if is_image && (opaque || rough) { skylight::table(panorama) } else { skylight::none() };
-            traced.push(buffer(commands.upload_buffer("cells of the environment", &cells)?));
+            traced.push(upload.buffer("cells of the environment", &cells)?);
         }
+        let emitters = if trace.is_some() && opaque && plan.model == Model::Path {
+            emitters::table(scene, &geometry)
+        } else {
+            emitters::none()
+        };
+        let emitters = upload.buffer("emitters", &emitters)?;
         let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
+        let fingerprint = upload.hash.as_ref().map(Xxh3::digest128);
         Ok(Self {
-            group: BindGroup::new(commands.gpu(), "scene", bindings)?,
+            group: BindGroup::new(upload.commands.gpu(), "scene", bindings)?,
             traced,
+            emitters,
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)
@@ -145,6 +182,7 @@ impl Resources {
             metres_per_unit: 1.0 / view.units_per_metre,
             opaque,
             acceleration: trace.map(|_| acceleration),
+            fingerprint,
         })
     }
 }
@@ -211,6 +249,11 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         tolerance: plan.tolerance as f32,
         ..Frame::default()
     }
+}
+
+/// What paths read of a frame.
+fn paths_frame(frame: Frame) -> Frame {
+    Frame { seed: 0, max_depth: 0, normals: 0, normals_in_all: 0, cutoff: 0.0, tolerance: 0.0, ..frame }
 }
 
 /// The panorama; with `levels` above 1 it has its halves below, side by side, as `shaders/environment.glsl` finds them. An image

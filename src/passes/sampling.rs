@@ -44,7 +44,7 @@ pub(super) struct Round {
 pub(super) fn rounds(plan: &Plan) -> Box<dyn Iterator<Item = Round>> {
     let (budget, size, seed) = (plan.budget, plan.size, plan.seed);
     if plan.model == Model::Path {
-        return Box::new(batches(budget, seed));
+        return Box::new(batches(budget));
     }
     let traces = plan.model.traces();
     let lit = move |push| if traces { footprint(spectrum(push, budget), budget) } else { push };
@@ -60,7 +60,7 @@ const OPEN_BATCH: u32 = 4;
 
 /// Batches of samples that are as independent of each other as random ones: each pixel's samples fill its square and whatever else they
 /// choose from evenly within a batch, so that the means of batches tell how far off theirs is. All of one size, a power of two.
-fn batches(budget: Budget, seed: u64) -> impl Iterator<Item = Round> {
+fn batches(budget: Budget) -> impl Iterator<Item = Round> {
     let (count, most) = match budget {
         Budget::Samples(count) => (count, (count / BATCHES).max(1)),
         Budget::Seconds { most, .. } => (most, OPEN_BATCH),
@@ -68,8 +68,7 @@ fn batches(budget: Budget, seed: u64) -> impl Iterator<Item = Round> {
     let samples = (1 << most.ilog2()).min(1 << count.trailing_zeros());
     (0..count / samples).map(move |batch| {
         let push = SamplePush { sample_index: batch, samples_in_batch: samples, ..SamplePush::default() };
-        let shift = unit(scramble(seed ^ scramble(u64::from(batch))));
-        Round { push: with_lines(push, shift), samples }
+        Round { push, samples }
     })
 }
 
@@ -84,10 +83,6 @@ fn spectrum(push: SamplePush, budget: Budget) -> SamplePush {
         }
         Budget::Seconds { .. } => (0.5 + index * GOLDEN).fract_gl(),
     };
-    with_lines(push, shift)
-}
-
-fn with_lines(push: SamplePush, shift: f64) -> SamplePush {
     let spectrum = spectrum::lines(shift).map(|line| line.weight.extend(line.wavelength).as_vec4().to_array());
     SamplePush { wavelengths: WAVELENGTHS as u32, spectrum, ..push }
 }

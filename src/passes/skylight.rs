@@ -3,6 +3,9 @@
 
 use std::f64::consts::PI;
 
+use glam::DVec3;
+
+use crate::optics::spectrum::luminance;
 use crate::scene::Panorama;
 
 /// The most cells of a table; a panorama of more texels is halved.
@@ -57,8 +60,8 @@ fn add_up(table: &mut Vec<f32>, parts: &[f64]) {
 /// from.
 fn light(panorama: &Panorama) -> Vec<f64> {
     let (width, height) = (panorama.width as usize, panorama.height as usize);
-    let luminance = |&[r, g, b]: &[f32; 3]| 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b);
-    let texels: Vec<f64> = panorama.texels.iter().map(luminance).collect();
+    let wide = |&texel: &[f32; 3]| DVec3::from_array(texel.map(f64::from));
+    let texels: Vec<f64> = panorama.texels.iter().map(|texel| luminance(wide(texel))).collect();
     // Of a line between texels' centres 3/4 of what lies in a texel is its own, and 1/8 that of each neighbour.
     let mean = |before: f64, own: f64, after: f64| 0.75 * own + 0.125 * (before + after);
     let across = |y: usize, x: usize| {

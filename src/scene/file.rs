@@ -178,7 +178,7 @@ impl Reader<'_> {
     fn option(&self, entry: Entry<'_>) -> Result<OsString> {
         let text = match entry.key {
             "env" => return Ok(self.path(entry)?.into()),
-            "stats" => return Ok(self.folder.join(entry.text("a file name")?).into()),
+            "stats" | "checkpoint" => return Ok(self.folder.join(entry.text("a file name")?).into()),
             "size" => {
                 entry.integers::<2>("width and height, as in [1024, 768]")?.map(|side| side.to_string()).join("x")
             }

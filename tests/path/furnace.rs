@@ -57,6 +57,21 @@ fn rough_bodies_are_white() {
     validated.verdict();
 }
 
+/// The same of rough panes, which have no inside.
+#[test]
+fn rough_panes_are_white() {
+    let Some(validated) = Validated::open() else { return };
+    for roughness in [0.1_f64, 0.5, 1.0] {
+        let pane = Dielectric { roughness, thin_walled: true, ..glass(1.5) };
+        let scene = in_white(scene([Part::of(icosphere(5), Surface::Dielectric(pane))]));
+        let found = picture(&validated, &scene, Shot { depth: 1024, samples: 64, ..Shot::default() });
+        let error = found.error_of_mean().x;
+        println!("roughness {roughness}: {:.4} +- {error:.4}", found.mean().x);
+        assert!((found.mean() - 1.0).abs().max_element() < 2e-3 + 4.0 * error, "{roughness}: {}", found.mean());
+    }
+    validated.verdict();
+}
+
 /// A Lambertian body reflects its share; a white one of any roughness never more than there is.
 #[test]
 fn opaque_bodies_reflect_their_share() {

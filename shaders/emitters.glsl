@@ -1,0 +1,64 @@
+// Surfaces that shine as lights: triangles chosen by how much they do. src/passes/emitters.rs makes the table.
+#ifndef EMITTERS_GLSL
+#define EMITTERS_GLSL
+
+#include "shared.glsl"
+#include "surface.glsl"
+#include "trace.glsl"
+
+struct Emitter {
+    float start;    // what lies before it in a list of all, as a share of the whole
+    float share;
+    uint instance;
+    uint triangle;
+};
+
+layout(std430, set = 0, binding = 18) readonly buffer EmitterBuffer {
+    uint emitterCount;
+    float emittedPower;  // luminance times area, of all
+    uvec2 emitterPadding;
+    Emitter emitters[];
+};
+
+struct EmitterSample {
+    vec3 position;
+    vec3 faceNormal;  // of unit length
+    Found found;
+    float pdf;        // per area
+};
+
+// A point, evenly spread on the triangle that `u.x` chooses: A. Heitz, "A Low-Distortion Map Between Triangle and Square" (2019).
+EmitterSample SampleEmitter(float choice, vec2 u)
+{
+    uint low = 0;
+    uint high = emitterCount;
+    while (high - low > 1) {
+        uint middle = (low + high) / 2;
+        if (emitters[middle].start <= choice) low = middle; else high = middle;
+    }
+    Emitter emitter = emitters[low];
+    Instance instance = instances[emitter.instance];
+    uint triangle = instance.firstTriangle + emitter.triangle;
+    vec3 a = instance.objectToWorld * vec4(FetchCorner(triangle, 0), 1.0);
+    vec3 b = instance.objectToWorld * vec4(FetchCorner(triangle, 1), 1.0);
+    vec3 c = instance.objectToWorld * vec4(FetchCorner(triangle, 2), 1.0);
+    vec2 place = 0.5 * u;
+    if (u.y > u.x) place.y = u.y - place.x; else place.x = u.x - place.y;
+    vec3 normal = cross(b - a, c - a);
+    float size = length(normal);
+    EmitterSample chosen;
+    chosen.position = a + place.x * (b - a) + place.y * (c - a);
+    chosen.faceNormal = normal / size;
+    chosen.found = Found(emitter.instance, emitter.triangle);
+    chosen.pdf = emitter.share / (0.5 * size);
+    return chosen;
+}
+
+// The density per steradian of choosing a point that is seen at `distance`, its surface at an angle of `cosine`.
+float EmitterPdf(vec3 emission, float distance, float cosine)
+{
+    float luminance = dot(emission, vec3(0.2126, 0.7152, 0.0722));
+    return luminance / emittedPower * distance * distance / max(abs(cosine), 1e-6);
+}
+
+#endif

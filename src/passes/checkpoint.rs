@@ -1,0 +1,178 @@
+//! A render that can be interrupted: what it has found so far, in a file, and where it goes on. In flow images of the device and how far
+//! they are, out flows a file that a later run of the same render reads.
+//!
+//! The file: a line of JSON, [`Head`], then the images of the model, texel after texel as the device has them.
+
+use std::fs::File;
+use std::io::{self, BufRead, BufReader, Read, Write};
+use std::path::Path;
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+use xxhash_rust::xxh3::Xxh3;
+
+use crate::gpu::{Commands, Gpu, Image};
+use crate::image::OutputFile;
+use crate::options::Trace;
+use crate::plan::{Budget, Plan};
+use crate::{Error, Result};
+
+/// A version of the file.
+const FORMAT: u32 = 1;
+
+/// The longest first line that a checkpoint has.
+const MOST_HEAD: u64 = 1 << 16;
+
+/// How long a render works before what it found is saved, at least, and how many times as long as saving takes.
+const LEAST_WORK: Duration = Duration::from_secs(1);
+const WORK_PER_SAVE: u32 = 20;
+
+/// What shapes a picture, by name: renders with the same values go through the same states.
+type Key = Vec<(String, String)>;
+
+/// What tells a render of the scene with such a fingerprint from others.
+pub(super) fn key(gpu: &Gpu, plan: &Plan, trace: Option<Trace>, scene: Option<u128>) -> Key {
+    let device = gpu.info();
+    let samples = match plan.budget {
+        Budget::Samples(samples) => samples.to_string(),
+        Budget::Seconds { most, .. } => format!("as time allows, up to {most}"),
+    };
+    let entries = [
+        ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("device", format!("{}, {}", device.name, device.driver)),
+        ("--trace", trace.map_or("none", Trace::name).to_owned()),
+        ("--size", plan.size.to_string()),
+        ("--samples", samples),
+        ("--max-depth", plan.max_depth.unwrap_or(0).to_string()),
+        ("--seed", plan.seed.to_string()),
+        ("effects", plan.effects.names().join(",")),
+        ("scene", scene.map(|hash| format!("{hash:032x}")).unwrap_or_default()),
+    ];
+    entries.map(|(name, value)| (name.to_owned(), value)).into()
+}
+
+/// How far a render is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub(super) struct Progress {
+    /// Rounds that are done.
+    pub(super) rounds: u32,
+    /// Rows of the next one that are.
+    pub(super) rows: u32,
+}
+
+/// The first line of a file.
+#[derive(Debug, Serialize, Deserialize)]
+struct Head {
+    vitrum_checkpoint: u32,
+    key: Key,
+    #[serde(flatten)]
+    progress: Progress,
+    bytes: u64,
+    xxh3: String,
+}
+
+/// Where a render is saved from time to time.
+pub(super) struct Checkpoint {
+    file: OutputFile,
+    key: Key,
+    last: Instant,
+    pause: Duration,
+    /// What the last attempt to save said, if it failed.
+    pub(super) failure: Option<Error>,
+}
+
+impl Checkpoint {
+    /// For the render that `key` tells from others.
+    pub(super) fn new(path: &Path, key: Key) -> Result<Self> {
+        let file = OutputFile::new(path)?;
+        Ok(Self { file, key, last: Instant::now(), pause: LEAST_WORK, failure: None })
+    }
+
+    /// Puts what the file holds into `images`, and says how far it is: at the start where there is no file.
+    ///
+    /// # Errors
+    ///
+    /// If the file is no checkpoint, is damaged, or is that of another render.
+    pub(super) fn resume(&self, commands: &mut Commands, images: &[&Image]) -> Result<Progress> {
+        let path = self.file.path();
+        let file = match File::open(path) {
+            Ok(file) => file,
+            Err(error) if error.kind() == io::ErrorKind::NotFound => return Ok(Progress::default()),
+            Err(error) => return Err(Error::file(path, "read", error)),
+        };
+        let mut reader = BufReader::new(file);
+        let mut line = Vec::new();
+        let read = |source| Error::file(path, "read", source);
+        reader.by_ref().take(MOST_HEAD).read_until(b'\n', &mut line).map_err(read)?;
+        let head: Head = serde_json::from_slice(&line)
+            .map_err(|_| Error::input(path, 0, "is no checkpoint of this program; name another file"))?;
+        if head.vitrum_checkpoint != FORMAT {
+            let message = format!("is of version {}, this program reads {FORMAT}; delete it", head.vitrum_checkpoint);
+            return Err(Error::input(path, 0, message));
+        }
+        for ((name, held), (_, wanted)) in head.key.iter().zip(&self.key) {
+            if held != wanted {
+                let message = format!(
+                    "holds a render with {name} {held}, this one has {wanted}; go on with that one, or name another file"
+                );
+                return Err(Error::input(path, 0, message));
+            }
+        }
+        let sizes: Vec<u64> = images.iter().map(|image| image.bytes()).collect();
+        let damaged = |what: &str| Error::input(path, 0, format!("is damaged: {what}; delete it to start over"));
+        if head.bytes != sizes.iter().sum::<u64>() || head.key.len() != self.key.len() {
+            return Err(damaged("it holds images of another size"));
+        }
+        let mut hash = Xxh3::new();
+        let mut all = Vec::new();
+        for size in sizes {
+            let mut texels = Vec::new();
+            reader.by_ref().take(size).read_to_end(&mut texels).map_err(read)?;
+            if texels.len() as u64 != size {
+                return Err(damaged("its end is missing"));
+            }
+            hash.update(&texels);
+            all.push(texels);
+        }
+        if format!("{:032x}", hash.digest128()) != head.xxh3 {
+            return Err(damaged("its checksum is another one"));
+        }
+        for (image, texels) in images.iter().zip(all) {
+            commands.write_image(image, &texels)?;
+        }
+        Ok(head.progress)
+    }
+
+    /// Whether it is time to save.
+    pub(super) fn is_due(&self) -> bool {
+        self.last.elapsed() >= self.pause
+    }
+
+    /// Saves `images`. That a disk is full is no reason to stop: the file before stays, and `failure` tells.
+    pub(super) fn save(&mut self, commands: &mut Commands, images: &[&Image], progress: Progress) -> Result<()> {
+        let start = Instant::now();
+        let mut hash = Xxh3::new();
+        let mut all = Vec::new();
+        for image in images {
+            let texels = commands.read_image(image)?;
+            hash.update(&texels);
+            all.push(texels);
+        }
+        let head = Head {
+            vitrum_checkpoint: FORMAT,
+            key: self.key.clone(),
+            progress,
+            bytes: images.iter().map(|image| image.bytes()).sum(),
+            xxh3: format!("{:032x}", hash.digest128()),
+        };
+        let written = self.file.write_with(|file| {
+            serde_json::to_writer(&mut *file, &head)?;
+            file.write_all(b"\n")?;
+            all.iter().try_for_each(|texels| file.write_all(texels))
+        });
+        self.failure = written.err();
+        self.last = Instant::now();
+        self.pause = LEAST_WORK.max(start.elapsed() * WORK_PER_SAVE);
+        Ok(())
+    }
+}

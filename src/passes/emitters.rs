@@ -1,0 +1,82 @@
+//! Surfaces that shine, as lights: a table that chooses triangles by how much light they send out. In flow a scene and its geometry, out
+//! flow words for `shaders/emitters.glsl`.
+
+use super::geometry::Geometry;
+use crate::optics::spectrum::luminance;
+use crate::scene::{Scene, Surface};
+
+/// The table of a scene where nothing shines, or is not looked for.
+pub(super) fn none() -> Vec<u32> {
+    header(0, 0.0)
+}
+
+/// `emitterCount` and `emittedPower`, and the padding behind them.
+fn header(count: u32, power: f32) -> Vec<u32> {
+    vec![count, power.to_bits(), 0, 0]
+}
+
+/// Each triangle that shines, with its share of the light: its luminance times its area.
+pub(super) fn table(scene: &Scene, geometry: &Geometry) -> Vec<u32> {
+    let mut shining = Vec::new();
+    for ((number, instance), &object) in (0..).zip(&geometry.instances).zip(&geometry.objects) {
+        let object = &scene.objects[object];
+        let Surface::Opaque(opaque) = &scene.materials[object.material].surface else { continue };
+        let brightness = luminance(opaque.emission);
+        if brightness <= 0.0 {
+            continue;
+        }
+        let to_world = instance.object_to_world.linear();
+        for (triangle, place) in (0_u32..).zip(geometry.meshes[object.mesh].clone()) {
+            let [a, b, c] = geometry.corners_of(place).map(|corner| to_world * corner);
+            shining.push((brightness * 0.5 * (b - a).cross(c - a).length(), number, triangle));
+        }
+    }
+    shining.retain(|&(power, ..)| power > 0.0);
+    let whole: f64 = shining.iter().map(|&(power, ..)| power).sum();
+    let mut table = header(shining.len() as u32, whole as f32);
+    let mut sum = 0.0;
+    for (power, instance, triangle) in shining {
+        // What is chosen is what is divided by: the distance of the starts as they are rounded.
+        let start = (sum / whole) as f32;
+        sum += power;
+        let share = (sum / whole) as f32 - start;
+        table.extend([start.to_bits(), share.to_bits(), instance, triangle]);
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::options::{Size, Trace};
+    use crate::passes::view::View;
+    use crate::scene::{Opaque, Overrides};
+
+    #[test]
+    fn triangles_have_their_shares_of_the_light() {
+        let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        let view = View::new(&scene.camera, scene.bounds(), Size { width: 4, height: 3 });
+        let shine = |emission| Surface::Opaque(Opaque { emission, ..Opaque::default() });
+        let geometry = |scene: &Scene| Geometry::new(scene, &view, Some(Trace::Software), /* opaque: */ true);
+        assert_eq!(table(&scene, &geometry(&scene)), none());
+        scene.materials[0].surface = shine(DVec3::ZERO);
+        assert_eq!(table(&scene, &geometry(&scene)), none());
+        scene.materials[0].surface = shine(DVec3::new(0.0, 0.0, 3.0));
+        let table = table(&scene, &geometry(&scene));
+        let count = scene.objects.iter().map(|object| scene.meshes[object.mesh].triangles.len()).sum::<usize>();
+        assert_eq!(table[0] as usize, count);
+        let mut end = 0.0;
+        for words in table[4..].chunks(4) {
+            let (start, share) = (f32::from_bits(words[0]), f32::from_bits(words[1]));
+            assert!(start == end && share >= 0.0, "{start} {share}");
+            end = start + share;
+        }
+        assert_eq!(end, 1.0);
+        // Half of the light is not there if half of the brightness is not.
+        scene.materials[0].surface = shine(DVec3::new(0.0, 0.0, 1.5));
+        let dimmer = super::table(&scene, &geometry(&scene));
+        assert!((f32::from_bits(table[1]) / f32::from_bits(dimmer[1]) - 2.0).abs() < 1e-6);
+    }
+}
