@@ -52,12 +52,19 @@ struct Ray {
     uint passed;      // boundaries in a row between equal indices
 };
 
-// Where a pixel sees smooth glass both what that reflects and what it transmits are followed: one of them is rare at most angles, and
-// would make most of the noise. One waits for the other.
+// As long as a pixel is seen through smooth glass alone both what an interface reflects and what it transmits are followed: one of them is rare at
+// most angles, and would make most of the noise. One waits for the other.
 struct Waiting {
     Ray ray;
+    uint depth;
+    float share;
     bool isColored;
 };
+const int MOST_WAITING = 4;
+
+// Less of a pixel's light is not worth a path of its own: what water reflects of glass, 0.4 %, is. Among opaque surfaces, which share their
+// noise, only that of the first interface is.
+const float LEAST_SHARE = 0.002;
 
 // Pairs of numbers that a path takes: for the camera, and for each interface.
 const uint PAIR_PIXEL = 0;
@@ -68,6 +75,7 @@ const uint PAIR_CHOICE = 1;
 const uint PAIR_LIGHT = 2;
 const uint PAIR_LIGHT_CHOICE = 3;
 const uint PAIRS_OF_INTERFACE = 4;
+const uint PAIRS_OF_BRANCH = 1 << 18; // more than the deepest path takes
 
 float PowerHeuristic(float pdf, float other)
 {
@@ -265,9 +273,12 @@ void main()
     Ray path = Ray(vec3(0.0), vec3(0.0, 0.0, -1.0), vec3(0.0), LARGEST_FLOAT, atCamera, NOWHERE, NOWHERE, 0);
     Ray light = path;
     bool toLight = false;
-    Waiting waiting = Waiting(path, false);
-    bool waits = false;
+    Waiting waiting[MOST_WAITING];
+    for (int i = 0; i < MOST_WAITING; ++i) waiting[i] = Waiting(path, 0, 0.0, false);
+    int top = 0;
+    uint branch = 0;
     float share = 1.0; // of the pixel's light that the path stands for
+    bool isClear = true; // nothing spread it yet
     bool goesOn = false;
     Sequence sequence = Sequence(0, 0);
     uint depth = 0;
@@ -275,6 +286,7 @@ void main()
     float travelled = 0.0; // from the interface before
     Wavelength wavelength = Wavelength(D_LINE, vec3(1.0));
     bool isColored = false;
+    bool isBeyondGlass = false;
 
     for (;;) {
         if (next == NEXT_PIXEL) {
@@ -295,9 +307,11 @@ void main()
             depth = 0;
             pdf = NO_PDF;
             travelled = 0.0;
+            isBeyondGlass = false;
             toLight = false;
-            waits = false;
+            branch = 0;
             share = 1.0;
+            isClear = true;
             goesOn = true;
             next = NEXT_RAY;
         }
@@ -305,13 +319,17 @@ void main()
         Ray ray = path;
         if (isLight) ray = light;
         Found found = NOWHERE;
-        bool meets = Trace(ray.origin, ray.direction, ray.left, found);
+        // Without the interior the environment and the lights are all that lies beyond glass.
+        bool meets = (INTERIOR || !isBeyondGlass) && Trace(ray.origin, ray.direction, ray.left, found);
         ++rays;
 
         Arrival arrival;
         Material material = materials[0];
         if (meets) arrival = ArriveAt(found, ray.origin, ray.direction);
-        if (meets && isLight) meets = arrival.distance < ray.reach && found != ray.aim;
+        if (meets && isLight) {
+            bool isPoint = ray.reach < LARGEST_FLOAT && ray.aim == NOWHERE;
+            meets = arrival.distance < ray.reach && found != ray.aim && (SHADOWS || !isPoint);
+        }
         Boundary boundary = Boundary(ray.at, ray.at);
         Crossing crossing = Crossing(boundary, 1.0, 1.0, false, false, false);
         bool disperses = false;
@@ -368,8 +386,9 @@ void main()
                 ray.throughput *= wavelength.color;
                 isColored = true;
             }
-            uint pair = PAIRS_BEFORE + PAIRS_OF_INTERFACE * depth;
+            uint pair = PAIRS_BEFORE + PAIRS_OF_INTERFACE * depth + PAIRS_OF_BRANCH * branch;
             ++depth;
+            isBeyondGlass = !isOpaque;
             vec3 wi = -ray.direction;
             vec3 faceNormal = arrival.behind ? -arrival.faceNormal : arrival.faceNormal;
             vec3 normal = NormalTowards(arrival.behind ? -arrival.normal : arrival.normal, wi);
@@ -380,6 +399,7 @@ void main()
             bool reflected = false;
             bool isRough = ROUGHNESS && !isOpaque && IsRough(material);
             if (isOpaque || isRough) {
+                isClear = false;
                 mat3 toWorld = BasisAround(normal);
                 Met met = MetAt(material, arrival, crossing, wi * toWorld);
                 toLight = AskLight(met, toWorld, arrival, sequence, pair, ray, light);
@@ -408,14 +428,15 @@ void main()
                 vec3 wt = direction;
                 if (!crossing.isPane && !refraction.crossed.total) wt = DirectionAbove(normalize(refraction.wt), -faceNormal);
                 if (reflected ? !REFLECTION : !TRANSMISSION) weight = vec3(0.0);
-                if (depth == 1 && REFLECTION && TRANSMISSION && !refraction.crossed.total) {
+                float smaller = min(reflectance, 1.0 - reflectance) * share;
+                bool isWorthIt = depth == 1 ? smaller > 0.0 : !OPAQUE && smaller > LEAST_SHARE && top < MOST_WAITING;
+                if (isClear && isWorthIt && REFLECTION && TRANSMISSION) {
                     reflected = true;
                     weight = vec3(reflectance);
-                    waiting.ray = Ray(LeaveFrom(arrival, wt), wt, ray.throughput * (1.0 - reflectance), LARGEST_FLOAT, boundary.beyond, found,
+                    Ray transmitted = Ray(LeaveFrom(arrival, wt), wt, ray.throughput * (1.0 - reflectance), LARGEST_FLOAT, boundary.beyond, found,
                         NOWHERE, 0);
-                    waiting.isColored = isColored;
-                    share = reflectance;
-                    waits = true;
+                    waiting[top++] = Waiting(transmitted, depth, share * (1.0 - reflectance), isColored);
+                    share *= reflectance;
                 }
                 direction = reflected ? wr : wt;
             }
@@ -432,14 +453,17 @@ void main()
         }
 
         if (goesOn || toLight) continue;
-        if (waits) {
-            waits = false;
-            path = waiting.ray;
-            isColored = waiting.isColored;
-            share = 1.0 - share;
-            depth = 1;
+        if (top > 0) {
+            Waiting other = waiting[--top];
+            path = other.ray;
+            isColored = other.isColored;
+            share = other.share;
+            depth = other.depth;
             pdf = NO_PDF;
+            isClear = true;
+            ++branch;
             travelled = 0.0;
+            isBeyondGlass = true;
             goesOn = true;
             continue;
         }

@@ -4,9 +4,9 @@ use std::ops::RangeInclusive;
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::effects::{Effect, Effects};
+use crate::effects::{Effect, Effects, SMOOTH};
 use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap, Trace};
-use crate::scene::Scene;
+use crate::scene::{Scene, Surface};
 use crate::{Error, Result};
 
 /// A render, decided.
@@ -45,6 +45,8 @@ pub struct Plan {
     pub aovs: Vec<Aov>,
     /// Effects that the model simulates by something simpler.
     pub approximate: Effects,
+    /// Light that is in the scene and that the model cannot find, in words.
+    pub unseen: Vec<&'static str>,
     /// Where the render is saved from time to time, and goes on from.
     pub checkpoint: Option<PathBuf>,
     /// Controls of the original's user interface.
@@ -117,6 +119,19 @@ impl Model {
     pub fn traces(self) -> bool {
         matches!(self, Self::Tree | Self::Path)
     }
+}
+
+/// What no path chosen at random meets: it would have to run into a point.
+const POINT_THROUGH_GLASS: &str = "light of point lights through smooth glass, and their images in smooth surfaces";
+
+fn unseen(scene: &Scene, model: Model, effects: Effects) -> Vec<&'static str> {
+    let is_smooth = |surface: &Surface| match surface {
+        Surface::Dielectric(glass) => glass.roughness <= SMOOTH && glass.ior != 1.0,
+        Surface::Opaque(opaque) => opaque.roughness <= SMOOTH && opaque.specular.max(opaque.metallic) > 0.0,
+    };
+    let any_smooth = scene.objects.iter().any(|object| is_smooth(&scene.materials[object.material].surface));
+    let blind = model == Model::Path && effects.contains(Effect::DirectLight) && any_smooth;
+    if blind { vec![POINT_THROUGH_GLASS] } else { Vec::new() }
 }
 
 impl Plan {
@@ -198,6 +213,7 @@ impl Plan {
             tonemap: args.tonemap.unwrap_or_default(),
             aovs,
             approximate,
+            unseen: unseen(scene, model, share(true)),
             checkpoint: args.checkpoint.clone(),
             debug: DebugControls::new(args),
             options: args.clone().or(RenderArgs {

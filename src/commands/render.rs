@@ -83,6 +83,10 @@ impl RenderCommand {
             let (model, names) = (plan.model.name(), plan.approximate.names().join(", "));
             talk.note(&format!("note: model {model} approximates {names}; see docs/tree.md"));
         }
+        if !plan.unseen.is_empty() {
+            let (model, what) = (plan.model.name(), plan.unseen.join("; "));
+            talk.note(&format!("note: model {model} cannot see {what}; see docs/path.md"));
+        }
         let overlapping = if plan.model.traces() { scene.bodies_at_one_place() } else { 0 };
         if overlapping > MOST_BODIES {
             talk.note(&format!(

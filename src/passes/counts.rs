@@ -51,14 +51,18 @@ pub(super) fn relative_error(mean: &[u8], spread: &[u8]) -> f64 {
 }
 
 /// Of the mean of independent batches, from the sum of their squared differences from it and their number. Scaled by what Student's t
-/// is wider than a normal distribution: two standard errors hold as much, 95 %, of few batches as of many (the first term of the
-/// expansion of its quantile in the number of batches).
+/// is wider than a normal distribution: two standard errors hold as much, 95 %, of few batches as of many (E. A. Cornish & R. A. Fisher
+/// 1937, the first terms of the quantile at 2 in the degrees of freedom).
 fn standard_error([r, g, b, batches]: [f32; 4]) -> [f64; 3] {
     let batches = f64::from(batches);
     [r, g, b].map(|squares| match batches {
         1.0 => f64::INFINITY,
-        _ => (1.0 + 1.25 / (batches - 1.0)) * (f64::from(squares) / (batches * (batches - 1.0))).sqrt(),
+        _ => scale(batches - 1.0) * (f64::from(squares) / (batches * (batches - 1.0))).sqrt(),
     })
+}
+
+fn scale(freedom: f64) -> f64 {
+    1.0 + 1.25 / freedom + 49.0 / 32.0 / (freedom * freedom)
 }
 
 fn texels(bytes: &[u8]) -> Vec<[f32; 4]> {

@@ -14,6 +14,7 @@ pub const SIZE: Size = Size { width: 48, height: 36 };
 /// How a picture is taken.
 #[derive(Clone, Copy, Debug)]
 pub struct Shot {
+    pub size: Size,
     pub samples: u32,
     pub depth: u32,
     pub seed: u64,
@@ -24,7 +25,7 @@ pub struct Shot {
 
 impl Default for Shot {
     fn default() -> Self {
-        Self { samples: 256, depth: 32, seed: 0, estimator: Estimator::Both, effects: "auto", trace: None }
+        Self { size: SIZE, samples: 256, depth: 32, seed: 0, estimator: Estimator::Both, effects: "auto", trace: None }
     }
 }
 
@@ -43,7 +44,7 @@ fn wide(pixels: &[[f32; 3]]) -> Vec<DVec3> {
 pub fn picture(validated: &Validated, scene: &Scene, shot: Shot) -> Picture {
     let args = RenderArgs {
         model: Some(Model::Path),
-        size: Some(SIZE),
+        size: Some(shot.size),
         samples: Some(shot.samples),
         max_depth: Some(shot.depth),
         seed: Some(shot.seed),

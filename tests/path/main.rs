@@ -11,4 +11,5 @@ mod furnace;
 #[allow(dead_code, reason = "each test program uses its share")]
 #[path = "../tree/shapes.rs"]
 mod shapes;
+mod statistics;
 mod truth;
