@@ -8,6 +8,7 @@ docs/yardstick.md says how to install what this needs and how to read what it pr
 
 import argparse
 import contextlib
+import dataclasses
 import json
 import os
 import platform
@@ -54,6 +55,7 @@ def options():
     parser.add_argument("--vitrum", default=str(ROOT / "target/release/vitrum"), help="the program")
     parser.add_argument("--size", type=size, help="WxH; 128x96 for compare, 512x384 for time")
     parser.add_argument("--effort", type=float, default=1.0, help="compare: factor of the samples")
+    parser.add_argument("--model", choices=("path", "tree"), help="compare: this one alone")
     parser.add_argument("--json", help="file that a JSON line for each result is added to")
     parser.add_argument("--keep", type=Path, help="compare: folder for the means and variances, as .npz")
     return parser.parse_args()
@@ -100,6 +102,8 @@ def main():
         }
         print(json.dumps(about))
         if asked.command == "compare":
+            if asked.model:
+                chosen = [dataclasses.replace(s, models=(asked.model,)) for s in chosen if asked.model in s.models]
             sys.exit(not compare.compare(chosen, make_ours, make_theirs, about, log, asked.keep, asked.effort))
         timing.measure(chosen, make_ours, make_theirs, about, log)
 

@@ -11,8 +11,8 @@ OUR_RUNS = {"path": 16, "tree": 4}
 # Samples of each, before a scene's own factor.
 THEIR_SAMPLES = 256
 OUR_SAMPLES = {"path": 128, "tree": 64}
-# Of `tree`, so that what it cuts off does not count.
-OUR_OPTIONS = {"path": (), "tree": ("--tolerance", "1e-5")}
+# Of `tree`, so that what it cuts off counts little; less than this takes minutes in walls that guide light.
+OUR_OPTIONS = {"path": (), "tree": ("--tolerance", "1e-3")}
 # What a ratio or a mean may be off by, in standard errors.
 ALLOWED = 4.0
 # Pictures no further apart than this, in relMSE and per cent of the mean, are equal: 32-bit arithmetic, and light that

@@ -49,7 +49,8 @@ def scene_file(scene, meshes, assets, path):
         lines += ["[[light]]", 'kind = "point"', f"position = {list(position)}", f"intensity = {list(intensity)}"]
     for i, body in enumerate(scene.bodies):
         lines += material_lines(f"m{i}", body.material, assets["texture"])
-        lines += ["[[object]]", f'mesh = "{meshes[body.mesh]}"', f'material = "m{i}"', f"smooth = {str(body.smooth).lower()}"]
+        lines += ["[[object]]", f'mesh = "{meshes[body.mesh]}"', f'material = "m{i}"']
+        lines += [f"smooth = {str(body.smooth).lower()}"]
         lines += [f"translate = {list(body.translate)}", f"rotate = {list(body.rotate)}", f"scale = {list(body.scale)}"]
     path.write_text("\n".join(lines) + "\n")
 

@@ -145,7 +145,11 @@ COMPARED = TIMED + (
     ),
     Scene("white metal, alpha 0.16", BALL_CAMERA, (Body("ball", Material("metal", alpha=0.16)),)),
     Scene("white mirror", BALL_CAMERA, (Body("ball", Material("metal")),)),
-    Scene("textured table", BALL_CAMERA, (Body("ball", GLASS), Body("small_table", Material("diffuse", textured=True)))),
+    Scene(
+        "textured table",
+        BALL_CAMERA,
+        (Body("ball", GLASS), Body("small_table", Material("diffuse", textured=True))),
+    ),
     Scene(
         "point light",
         BALL_CAMERA,

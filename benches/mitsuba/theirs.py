@@ -150,9 +150,10 @@ class Theirs:
         for i, (position, intensity) in enumerate(scene.lights):
             strength = {"type": "rgb", "value": list(intensity)}
             world[f"light{i}"] = {"type": "point", "position": list(position), "intensity": strength}
-        made = [s for body in scene.interfaces or scene.bodies for s in shapes(body, meshes, assets["texture"], analytic)]
+        bodies = scene.interfaces or scene.bodies
+        made = [shape for body in bodies for shape in shapes(body, meshes, assets["texture"], analytic)]
         world |= {f"shape{i}": shape for i, shape in enumerate(made)}
-        self.dispersing = {f"shape{i}": b.material for i, b in enumerate(scene.bodies) if b.material.dispersion}
+        self.dispersing = {f"shape{i}": b.material for i, b in enumerate(bodies) if b.material.dispersion}
         self.matching = colour_matching_table if scene.published_colours else colour_matching_fit
         self.scene = mitsuba.load_dict(world)
         self.parameters = mitsuba.traverse(self.scene)
