@@ -78,7 +78,7 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<Materia
         if plan.effects.contains(Effect::EnergyCompensation) && is_rough(material) {
             let alpha = roughness * roughness;
             match plan.model {
-                Model::Path => albedo_tables = albedos.pairs(alpha, ior, &others),
+                Model::Path | Model::Double => albedo_tables = albedos.pairs(alpha, ior, &others),
                 _ => albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: ior }),
             }
         }

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use glam::DVec3;
 use half::f16;
 
+use super::double::{Facet, Placed};
 use super::geometry::{Draw, Geometry};
 use super::materials::{is_rough, materials, texels};
 use super::skylight;
@@ -34,6 +35,10 @@ pub(super) struct Resources {
     pub(super) group: BindGroup,
     /// The same with what only traced models read.
     pub(super) traced: Vec<Bind>,
+    /// The same with what only `double` reads.
+    pub(super) layered: Vec<Bind>,
+    /// The instances in the picture, of `double`.
+    pub(super) placed: Vec<Placed>,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
@@ -132,10 +137,20 @@ impl Resources {
             let cells = if is_image && (opaque || rough) { skylight::table(panorama) } else { skylight::none() };
             traced.push(buffer(commands.upload_buffer("cells of the environment", &cells)?));
         }
+        let mut layered = Vec::new();
+        let mut placed = Vec::new();
+        if plan.model == Model::Double {
+            placed = Placed::all(scene, &geometry, &view, plan.size);
+            layered.clone_from(&bindings);
+            layered.push(buffer(commands.upload_buffer("facets", &Facet::all(scene, &geometry))?));
+            layered.push(buffer(commands.upload_buffer("instances in the picture", &placed)?));
+        }
         let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
         Ok(Self {
             group: BindGroup::new(commands.gpu(), "scene", bindings)?,
             traced,
+            layered,
+            placed,
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)
