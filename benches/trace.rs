@@ -99,7 +99,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             let rendered = render(&gpu, scene, &Plan::new(scene, &args)?, &mut |_| {})?;
             let pass = rendered.passes.iter().find(|pass| pass.name == "tree");
             times[i].push(pass.and_then(|pass| pass.gpu_ms).ok_or("the device has no clock")?);
-            rays[i] = rendered.counts.map_or(0, |counts| counts.rays);
+            rays[i] = rendered.counts.and_then(|counts| counts.rays).unwrap_or(0);
         }
     }
     for ((scene, times), rays) in scenes.iter().zip(times).zip(rays) {

@@ -29,6 +29,16 @@ uvec3 FetchTriangle(Instance instance, uint triangle)
     return instance.firstVertex + uvec3(triangles[first], triangles[first + 1], triangles[first + 2]);
 }
 
+// The normal in the world, at the weights b1 and b2 of the second and the third corner; `normal` is that of the face in the mesh's space.
+vec3 NormalAt(Instance instance, uvec3 vertices, vec3 normal, float b1, float b2)
+{
+    if (instance.smoothNormals != 0) {
+        vec3 first = FetchNormal(vertices.x);
+        normal = normalize(first + b1 * (FetchNormal(vertices.y) - first) + b2 * (FetchNormal(vertices.z) - first));
+    }
+    return normalize(mat3(instance.normalToWorld) * normal);
+}
+
 // Where the camera's ray along `direction` meets the plane of `triangle`: Moeller & Trumbore 1997, in the mesh's space.
 Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
 {
@@ -54,11 +64,7 @@ Hit IntersectCameraRay(Instance instance, uint triangle, vec3 direction)
     float b1 = clamp(dot(fromCorner, p) * inverse, -1.0, 2.0);
     float b2 = clamp(dot(ray, q) * inverse, -1.0, 2.0);
     hit.weights = vec3(1.0 - b1 - b2, b1, b2);
-    if (instance.smoothNormals != 0) {
-        vec3 first = FetchNormal(vertices.x);
-        normal = normalize(first + b1 * (FetchNormal(vertices.y) - first) + b2 * (FetchNormal(vertices.z) - first));
-    }
-    hit.normal = normalize(mat3(instance.normalToWorld) * normal);
+    hit.normal = NormalAt(instance, vertices, normal, b1, b2);
     return hit;
 }
 

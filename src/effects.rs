@@ -55,10 +55,11 @@ struct Row {
 /// THE table. Detection is conservative: an effect that might show is called for.
 const TABLE: [Row; 13] = {
     use Effect::*;
-    use Model::{Path, Single, Tree};
+    use Model::{Double, Path, Single, Tree};
     const TRACED: &[Model] = &[Tree, Path];
-    const ALL: &[Model] = &[Single, Tree, Path];
-    const ROUGH: &[Model] = &[Single, Path];
+    const ALL: &[Model] = &[Single, Double, Tree, Path];
+    const ROUGH: &[Model] = &[Single, Double, Path];
+    const INSIDE: &[Model] = &[Double, Tree, Path];
     const fn row(effect: Effect, name: &'static str, models: &'static [Model], called_for: fn(&Scene) -> bool) -> Row {
         let needs = if matches!(effect, EnergyCompensation) { Some(Roughness) } else { None };
         Row { effect, name, models, needs, called_for }
@@ -66,15 +67,15 @@ const TABLE: [Row; 13] = {
     [
         row(Reflection, "reflection", ALL, |s| any_dielectric(s, |_| true)),
         row(Transmission, "transmission", ALL, |s| any_dielectric(s, |_| true)),
-        row(Interior, "interior", TRACED, |s| any_dielectric(s, |_| true)),
+        row(Interior, "interior", INSIDE, |s| any_dielectric(s, |_| true)),
         row(DirectLight, "direct-light", ALL, has_light),
         row(Shadows, "shadows", TRACED, has_light),
         row(Roughness, "roughness", ROUGH, |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
         row(EnergyCompensation, "energy-compensation", ROUGH, |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
-        row(Absorption, "absorption", TRACED, |s| any_dielectric(s, absorbs)),
+        row(Absorption, "absorption", INSIDE, |s| any_dielectric(s, absorbs)),
         row(Dispersion, "dispersion", TRACED, |s| any_dielectric(s, disperses)),
         row(Nesting, "nesting", TRACED, nests),
-        row(ThinWalled, "thin-walled", TRACED, |s| any_dielectric(s, |d| d.thin_walled)),
+        row(ThinWalled, "thin-walled", INSIDE, |s| any_dielectric(s, |d| d.thin_walled)),
         row(Opaque, "opaque", TRACED, |s| surfaces(s).any(|x| matches!(x, Surface::Opaque(_)))),
         row(Textures, "textures", TRACED, |s| {
             surfaces(s).any(|x| matches!(x, Surface::Opaque(opaque) if opaque.base_color_texture.is_some()))
@@ -139,9 +140,12 @@ impl Effect {
         self.row().models.contains(&model)
     }
 
-    /// Whether `model` simulates this by something simpler: docs/tree.md says what.
+    /// Whether `model` simulates this by something simpler: its page in docs says what.
     pub fn approximated_by(self, model: Model) -> bool {
-        matches!((model, self), (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows))
+        matches!(
+            (model, self),
+            (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows) | (Model::Double, Self::Interior)
+        )
     }
 
     /// Whether something in `scene` may show this.

@@ -17,7 +17,7 @@ pub const MOST_DEPTH: u32 = 1 << 16;
 pub enum Model {
     /// The original: rasterised, one interface, reflection and refraction see the environment only
     Single,
-    /// Rasterised, front and back interface
+    /// Rasterised, front and back interface: bodies seen through, without rays
     Double,
     /// The whole tree of reflections and refractions, enumerated
     Tree,
@@ -195,11 +195,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = range::samples)]
     pub samples: Option<u32>,
 
-    /// Longest chain of interfaces; model single sees one [default: 32; tree with --tolerance: 1024]
+    /// Longest chain of interfaces; model single sees one [default: 32; double: 16; tree with --tolerance: 1024]
     #[arg(long, value_name = "N", value_parser = range::max_depth)]
     pub max_depth: Option<u32>,
 
-    /// tree: no pixel discards more than X of the light, but for chains beyond --max-depth; path: samples until the mean relative error is below X
+    /// tree: no pixel discards more than X of the light, but for chains beyond --max-depth; path and double: samples until the mean relative error is below X
     #[arg(long, value_name = "X", value_parser = range::positive)]
     pub tolerance: Option<f64>,
 
@@ -239,7 +239,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME")]
     pub tonemap: Option<Tonemap>,
 
-    /// Extra layers in the EXR; model single has normal, depth, object; tree also albedo, interfaces, discarded; path stderr in place of discarded
+    /// Extra layers in the EXR; model single has normal, depth, object; tree also albedo, interfaces, discarded; path and double stderr in place of discarded
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub aov: Option<Vec<Aov>>,
 

@@ -22,8 +22,8 @@ pub struct Plan {
     pub max_depth: Option<u32>,
     /// Throughput below which a branch is cut off.
     pub cutoff: f64,
-    /// What a user tolerates: of `tree` the throughput that a pixel may lose so, of `path` the mean relative error of the picture;
-    /// infinite: anything.
+    /// What a user tolerates: of `tree` the throughput that a pixel may lose so, of `path` and `double` the mean relative error of the
+    /// picture; infinite: anything.
     pub tolerance: f64,
     /// Whether environment and textures are averaged over a sample's share of its pixel, where rays are traced.
     pub footprints: bool,
@@ -111,6 +111,9 @@ const DEPTH: u32 = 32;
 /// The same where a tolerance is asked for: long enough that few pixels miss it, short enough to end.
 const DEPTH_OF_TOLERANCE: u32 = 1024;
 
+/// The same in `double`, which finds longer chains less and less well.
+const DEPTH_OF_DOUBLE: u32 = 16;
+
 /// Throughput below which `tree` cuts a branch off, where no tolerance is asked for.
 const CUTOFF: f64 = 0.005;
 
@@ -135,11 +138,12 @@ fn unseen(scene: &Scene, model: Model, effects: Effects) -> Vec<&'static str> {
 }
 
 impl Plan {
-    /// Visible normals of a rough surface that each sample of a pixel takes.
+    /// Visible normals of a rough surface that each sample of a pixel takes: half as many where a chain of interfaces follows.
     pub fn normals(&self) -> u32 {
-        let (least, most) = (*NORMALS_A_SAMPLE.start(), *NORMALS_A_SAMPLE.end());
+        let share = if self.model == Model::Double { 2 } else { 1 };
+        let (least, most) = (NORMALS_A_SAMPLE.start() / share, NORMALS_A_SAMPLE.end() / share);
         match self.budget {
-            Budget::Samples(samples) => NORMALS.div_ceil(samples).clamp(least, most),
+            Budget::Samples(samples) => (NORMALS / share).div_ceil(samples).clamp(least, most),
             Budget::Seconds { .. } => most,
         }
     }
@@ -151,12 +155,7 @@ impl Plan {
             Model::Single => &[Aov::Normal, Aov::Depth, Aov::Object],
             Model::Tree => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded],
             Model::Path => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Stderr],
-            Model::Double => {
-                let name = model.name();
-                return Err(Error::Usage(format!(
-                    "--model {name}: this version has no such model yet; it has: single, tree, path"
-                )));
-            }
+            Model::Double => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Stderr],
         };
         if args.tolerance.is_some() && model == Model::Single {
             let hint = "model single has no error estimate; use --samples or --time-budget";
@@ -179,29 +178,37 @@ impl Plan {
         let most = args.samples.unwrap_or(MOST_SAMPLES);
         let budget = match args.time_budget {
             Some(seconds) => Budget::Seconds { seconds, most },
-            None if model == Model::Path && args.tolerance.is_some() => {
+            None if matches!(model, Model::Path | Model::Double) && args.tolerance.is_some() => {
                 Budget::Seconds { seconds: f64::INFINITY, most }
             }
             None => {
                 Budget::Samples(args.samples.unwrap_or(if model == Model::Path { SAMPLES_OF_PATH } else { SAMPLES }))
             }
         };
-        let depth = if args.tolerance.is_some() && model == Model::Tree { DEPTH_OF_TOLERANCE } else { DEPTH };
+        let depth = match model {
+            Model::Double => DEPTH_OF_DOUBLE,
+            Model::Tree if args.tolerance.is_some() => DEPTH_OF_TOLERANCE,
+            _ => DEPTH,
+        };
         let max_depth = (model != Model::Single).then(|| args.max_depth.unwrap_or(depth));
         let selection = args.effects.clone().unwrap_or_default();
         let selected = selection.resolve(scene);
         let share = |honoured: bool| -> Effects {
             selected.iter().filter(|effect: &Effect| effect.honoured_by(model) == honoured).collect()
         };
-        // Lights shine on opaque surfaces alone.
+        // In `tree` lights shine on opaque surfaces alone.
         let lit = share(true).contains(Effect::Opaque);
-        let approximate = share(true).iter().filter(|effect| lit && effect.approximated_by(model)).collect();
+        let simplifies = lit || model != Model::Tree;
+        let approximate = share(true).iter().filter(|effect| simplifies && effect.approximated_by(model)).collect();
         Ok(Self {
             model,
             size,
             budget,
             max_depth,
-            cutoff: args.tolerance.map_or(CUTOFF, |tolerance| tolerance / 4.0),
+            cutoff: match args.tolerance {
+                Some(tolerance) if model == Model::Tree => tolerance / 4.0,
+                _ => CUTOFF,
+            },
             tolerance: args.tolerance.unwrap_or(f64::INFINITY),
             footprints: model == Model::Tree,
             estimator: Estimator::default(),

@@ -40,7 +40,7 @@ fn bad_usage_and_bad_input_end_with_2_one_line_and_nothing_written() {
     write("open.toml", b"[environment\n");
     write("option.toml", b"[render]\nsamples = 0\n");
     write("typo2.toml", b"");
-    write("model.toml", b"[render]\nmodel = \"double\"\n");
+    write("model.toml", b"[render]\nmodel = \"double\"\naov = [\"discarded\"]\n");
     write("size.toml", b"[render]\nsize = [64, 48, 3]\n");
     write("missing.toml", b"[[object]]\nmesh = \"nowhere.obj\"\n");
     write("sky.toml", b"[environment]\nimage = \"broken.exr\"\n");
@@ -63,13 +63,13 @@ fn bad_usage_and_bad_input_end_with_2_one_line_and_nothing_written() {
         (&["render", "-o", "a.png", "--ior", "-1"], &["-1", "above 0"]),
         (&["render", "-o", "a.png", "--roughness", "nan"], &["nan", "0 to 1"]),
         (&["render", "-o", "a.png", "--model", "magic"], &["magic", "single"]),
-        (&["render", "-o", "a.png", "--model", "double"], &["double", "single, tree"]),
+        (&["render", "-o", "a.exr", "--model", "double", "--aov", "discarded"], &["discarded", "interfaces, stderr"]),
         (&["render", "-o", "a.png", "--effects", "magic"], &["magic", "direct-light"]),
         (&["render", "-o", "a.png", "--seed", "-1"], &["-1", "whole number"]),
         (&["render", "-o", "sky.toml", "sky.toml"], &["sky.toml", ".exr or .png"]),
         (&["render", "-o", "a.png", "--stats", "a.png"], &["a.png", "two files"]),
         (&["render", "-o", "a.png", "typo2.toml", "--stats", "typo2.toml"], &["typo2.toml", "replaced"]),
-        (&["render", "-o", "a.png", "model.toml"], &["model.toml", "double"]),
+        (&["render", "-o", "a.exr", "model.toml"], &["model.toml", "double"]),
         (&["render", "-o", "a.png", "size.toml"], &["size.toml:2", "width and height"]),
         (&["render", "-o", "a.png", "."], &["folder"]),
         (&["render", "-o", "a.png", "--aov", "depth"], &["--aov", ".exr"]),

@@ -81,7 +81,7 @@ impl RenderCommand {
         }
         if plan.approximate != Default::default() {
             let (model, names) = (plan.model.name(), plan.approximate.names().join(", "));
-            talk.note(&format!("note: model {model} approximates {names}; see docs/tree.md"));
+            talk.note(&format!("note: model {model} approximates {names}; see docs/{model}.md"));
         }
         if !plan.unseen.is_empty() {
             let (model, what) = (plan.model.name(), plan.unseen.join("; "));
@@ -186,9 +186,17 @@ impl RenderCommand {
 fn idle_options(options: &RenderArgs, format: ImageFormat) -> Vec<String> {
     let exr = format == ImageFormat::Exr;
     let single = options.model.is_none_or(|model| model == Model::Single);
+    let double = options.model == Some(Model::Double);
+    let controls = "it is a control of model single";
     [
         (single && options.max_depth.is_some(), "--max-depth", "model single sees one interface"),
         (single && options.trace.is_some(), "--trace", "model single traces no rays"),
+        (double && options.trace.is_some(), "--trace", "model double traces no rays"),
+        (!single && options.transmission_green.is_some(), "--transmission-green", controls),
+        (!single && options.reflection_red.is_some(), "--reflection-red", controls),
+        (!single && options.transmission_intensity.is_some(), "--transmission-intensity", controls),
+        (!single && options.reflection_intensity.is_some(), "--reflection-intensity", controls),
+        (!single && options.flipped_ratio.is_some(), "--flipped-ratio", controls),
         (exr && options.exposure.is_some(), "--exposure", "an EXR holds radiance as it is"),
         (exr && options.tonemap.is_some(), "--tonemap", "an EXR holds radiance as it is"),
     ]

@@ -306,6 +306,22 @@ impl<'r> Recorder<'_, 'r> {
         depth: Option<Target<'r>>,
         draw: impl FnOnce(&mut RenderPass<'_, 'r>),
     ) {
+        self.render_area(colors, depth, Area { corner: [0; 2], size: [u32::MAX; 2] }, draw);
+    }
+
+    /// As [`render`](Self::render), in a part of the targets: outside of `area` they keep what they hold, or hold nothing that is
+    /// known where they are cleared.
+    ///
+    /// # Panics
+    ///
+    /// If the targets are not of one size.
+    pub fn render_area(
+        &mut self,
+        colors: &[Target<'r>],
+        depth: Option<Target<'r>>,
+        area: Area,
+        draw: impl FnOnce(&mut RenderPass<'_, 'r>),
+    ) {
         let mut extents = colors.iter().chain(&depth).map(|target| target.image.extent);
         let Some(extent) = extents.next() else { return };
         assert!(extents.all(|other| other == extent), "targets of different sizes");
@@ -331,7 +347,7 @@ impl<'r> Recorder<'_, 'r> {
         };
         let color_infos: Vec<_> = colors.iter().map(|target| attach(target, Use::ColorTarget)).collect();
         let depth_info = depth.as_ref().map(|target| attach(target, Use::DepthTarget));
-        let area = vk::Rect2D { offset: vk::Offset2D::default(), extent };
+        let area = area.within(extent);
         let mut info = vk::RenderingInfo::default().render_area(area).layer_count(1).color_attachments(&color_infos);
         if let Some(depth) = &depth_info {
             info = info.depth_attachment(depth);
@@ -453,8 +469,44 @@ fn rows(image: &Image, first: u32, count: u32) -> vk::BufferImageCopy {
 pub struct Sides {
     /// Fronts are clockwise, as those of a mesh in a mirror; else counter-clockwise.
     pub clockwise: bool,
+    /// Those that are drawn.
+    pub shown: Shown,
+}
+
+/// Sides of triangles that are drawn.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Shown {
+    /// Fronts and backs.
+    #[default]
+    Both,
     /// Backs are left out.
-    pub fronts_only: bool,
+    Fronts,
+    /// Fronts are left out.
+    Backs,
+}
+
+/// A rectangle of an image, in texels from the top left corner.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Area {
+    /// Its first column and row.
+    pub corner: [u32; 2],
+    /// Columns and rows, at least 1.
+    pub size: [u32; 2],
+}
+
+impl Area {
+    /// What of it lies in an image; all of the image where nothing does.
+    fn within(self, image: vk::Extent2D) -> vk::Rect2D {
+        let whole = [image.width, image.height];
+        let corner: [u32; 2] = std::array::from_fn(|i| self.corner[i].min(whole[i]));
+        let size: [u32; 2] = std::array::from_fn(|i| self.size[i].min(whole[i] - corner[i]));
+        if size.contains(&0) {
+            return vk::Rect2D { offset: vk::Offset2D::default(), extent: image };
+        }
+        // Sides of images are far below 2^31.
+        let offset = vk::Offset2D { x: corner[0] as i32, y: corner[1] as i32 };
+        vk::Rect2D { offset, extent: vk::Extent2D { width: size[0], height: size[1] } }
+    }
 }
 
 /// Draws inside of [`Recorder::render`].
@@ -486,7 +538,11 @@ impl<'r> RenderPass<'_, 'r> {
         // SAFETY: a pipeline, its group and its push constants are bound inside of a rendering.
         unsafe {
             let front = if sides.clockwise { vk::FrontFace::CLOCKWISE } else { vk::FrontFace::COUNTER_CLOCKWISE };
-            let cull = if sides.fronts_only { vk::CullModeFlags::BACK } else { vk::CullModeFlags::NONE };
+            let cull = match sides.shown {
+                Shown::Both => vk::CullModeFlags::NONE,
+                Shown::Fronts => vk::CullModeFlags::BACK,
+                Shown::Backs => vk::CullModeFlags::FRONT,
+            };
             device.cmd_set_front_face(self.commands.buffer, front);
             device.cmd_set_cull_mode(self.commands.buffer, cull);
             device.cmd_draw(self.commands.buffer, vertices, 1, 0, 0);

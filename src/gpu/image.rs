@@ -84,6 +84,8 @@ pub enum Format {
     Rgba16Float,
     /// Four bytes, from 0 to 1.
     Rgba8,
+    /// A whole number of 32 bits.
+    R32Uint,
     /// A depth of 32-bit float.
     Depth32,
 }
@@ -94,6 +96,7 @@ impl Format {
             Self::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
             Self::Rgba16Float => vk::Format::R16G16B16A16_SFLOAT,
             Self::Rgba8 => vk::Format::R8G8B8A8_UNORM,
+            Self::R32Uint => vk::Format::R32_UINT,
             Self::Depth32 => vk::Format::D32_SFLOAT,
         }
     }
@@ -102,7 +105,7 @@ impl Format {
         match self {
             Self::Rgba32Float => 16,
             Self::Rgba16Float => 8,
-            Self::Rgba8 | Self::Depth32 => 4,
+            Self::Rgba8 | Self::R32Uint | Self::Depth32 => 4,
         }
     }
 }

@@ -20,7 +20,7 @@ mod shared;
 
 pub use acceleration::{AccelerationStructure, PlacedMesh};
 pub use bind_group::{Bind, BindGroup};
-pub use commands::{Commands, PassTime, Recorder, RenderPass, Sides, Target};
+pub use commands::{Area, Commands, PassTime, Recorder, RenderPass, Shown, Sides, Target};
 pub use device::Gpu;
 pub use error::GpuError;
 pub use image::{Format, Image, ImageDesc, Use};

@@ -1,4 +1,4 @@
-//! What models that trace count beside the light. In flow images as the device has them, out flows [`Counts`].
+//! What models count beside the light. In flow images as the device has them, out flows [`Counts`].
 
 use bytemuck::allocation::pod_collect_to_vec;
 
@@ -7,12 +7,12 @@ use bytemuck::allocation::pod_collect_to_vec;
 pub struct Counts {
     /// Throughput that `tree` cut off.
     pub discarded: Option<Vec<f32>>,
-    /// Standard error of the radiance that `path` found, of each channel; infinite with a single batch of samples.
+    /// Standard error of the radiance that `path` or `double` found, of each channel; infinite with a single batch of samples.
     pub stderr: Option<Vec<[f32; 3]>>,
     /// Interfaces that scattered light.
     pub interfaces: Vec<f32>,
-    /// Rays in all.
-    pub rays: u64,
+    /// Rays in all, of models that trace.
+    pub rays: Option<u64>,
 }
 
 impl Counts {
@@ -22,8 +22,17 @@ impl Counts {
     }
 
     pub(super) fn of_paths(counts: &[u8], spread: &[u8], samples: u32) -> Self {
-        let stderr = texels(spread).iter().map(|&texel| standard_error(texel).map(|error| error as f32)).collect();
-        Self { stderr: Some(stderr), ..Self::new(counts, samples) }
+        Self { stderr: Some(standard_errors(spread)), ..Self::new(counts, samples) }
+    }
+
+    /// Of `double`: each sample is a batch, and `mean` holds interfaces beside radiance.
+    pub(super) fn of_samples(mean: &[u8], spread: &[u8]) -> Self {
+        Self {
+            discarded: None,
+            stderr: Some(standard_errors(spread)),
+            interfaces: texels(mean).iter().map(|&[.., interfaces]| interfaces).collect(),
+            rays: None,
+        }
     }
 
     fn new(counts: &[u8], samples: u32) -> Self {
@@ -33,7 +42,7 @@ impl Counts {
             discarded: None,
             stderr: None,
             interfaces: counts.iter().map(|&[interfaces, ..]| interfaces).collect(),
-            rays: (rays * f64::from(samples)).round() as u64,
+            rays: Some((rays * f64::from(samples)).round() as u64),
         }
     }
 }
@@ -48,6 +57,10 @@ pub(super) fn relative_error(mean: &[u8], spread: &[u8]) -> f64 {
         .map(|(value, error)| error / (f64::from(value) + 0.1))
         .sum();
     errors / (3 * pairs.len()) as f64
+}
+
+fn standard_errors(spread: &[u8]) -> Vec<[f32; 3]> {
+    texels(spread).iter().map(|&texel| standard_error(texel).map(|error| error as f32)).collect()
 }
 
 /// Of the mean of independent batches, from the sum of their squared differences from it and their number. Scaled by what Student's t

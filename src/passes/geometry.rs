@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3, Vec3};
 
 use super::bvh::{Bvh, Node};
 use super::view::View;
-use crate::gpu::{InstanceRecord, PlacedMesh, Sides};
+use crate::gpu::{InstanceRecord, PlacedMesh, Shown, Sides};
 use crate::options::Trace;
 use crate::scene::{Bounds, Mesh, Object, Scene, Surface};
 
@@ -98,7 +98,7 @@ impl Geometry {
                     clockwise: object_to_world.matrix3.determinant() < 0.0,
                     // What is nearest of such a body is a front, unless it cuts through itself inside out: leaving out the
                     // backs changes nothing but the time.
-                    fronts_only: scene.is_seen_from_outside(object),
+                    shown: if scene.is_seen_from_outside(object) { Shown::Fronts } else { Shown::Both },
                 },
             });
         }

@@ -85,7 +85,7 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<Materia
                     // Both lobes of a pane are masked as those of a mirror, and lose the same.
                     albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: MIRROR });
                 }
-                Model::Path => albedo_tables = albedos.pairs(alpha, ior, &others),
+                Model::Path | Model::Double => albedo_tables = albedos.pairs(alpha, ior, &others),
                 _ => albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: ior }),
             }
         }

@@ -9,6 +9,7 @@ mod bvh;
 mod checkpoint;
 mod counts;
 mod display;
+mod double;
 mod emitters;
 mod environment;
 mod geometry;
@@ -37,6 +38,7 @@ use accumulate::Accumulate;
 use aov::AovPass;
 use checkpoint::{Checkpoint, Progress};
 use display::Display;
+use double::{Double, DoubleTargets};
 use environment::EnvironmentPass;
 use geometry::Draw;
 use path::{AfterRows, Path, PathTargets};
@@ -62,7 +64,7 @@ pub struct Rendered {
     pub display: Vec<[u8; 4]>,
     /// What lies at the centres of the pixels, if it was asked for.
     pub aovs: Option<Aovs>,
-    /// What a model that traces counted.
+    /// What the model counted, if it does.
     pub counts: Option<Counts>,
     /// How rays were traced, if any were.
     pub trace: Option<Trace>,
@@ -203,6 +205,8 @@ struct Passes {
 enum ModelPass {
     /// Rasterised: what is covered, what is not, the mean of both.
     Raster(Box<Raster>),
+    /// The same with what lies behind the surface.
+    Double(Box<Double>, EnvironmentPass),
     /// Every pixel's tree from the camera on.
     Tree(Box<Tree>),
     /// Every pixel's paths from the camera on.
@@ -228,6 +232,10 @@ impl Passes {
             (ModelTargets::Path(path), Some(trace)) => {
                 ModelPass::Path(Box::new(Path::new(&gpu, resources, path, trace)?))
             }
+            (ModelTargets::Double(double), _) => ModelPass::Double(
+                Box::new(Double::new(&gpu, resources, double)?),
+                EnvironmentPass::new(&gpu, resources)?,
+            ),
             _ => ModelPass::Raster(Box::new(Raster {
                 single: Single::new(&gpu, resources)?,
                 environment: EnvironmentPass::new(&gpu, resources)?,
@@ -273,8 +281,13 @@ impl Passes {
                 cmd.timed("environment", |cmd| raster.environment.record(cmd, resources, targets, push));
                 cmd.timed("accumulate", |cmd| raster.accumulate.record(cmd, targets, push.sample_index));
             })?),
+            (ModelPass::Double(pass, environment), ModelTargets::Double(double)) => Ok(commands.run(|cmd| {
+                cmd.timed("double", |cmd| pass.record(cmd, resources, targets, double, draws, push));
+                cmd.timed("environment", |cmd| environment.record(cmd, resources, targets, push));
+                cmd.timed("accumulate", |cmd| pass.accumulate(cmd, targets, double, push.sample_index));
+            })?),
             // A pass comes with its own targets.
-            (ModelPass::Tree(_) | ModelPass::Path(_), _) => Ok(Vec::new()),
+            (ModelPass::Tree(_) | ModelPass::Path(_) | ModelPass::Double(..), _) => Ok(Vec::new()),
         }
     }
 }
@@ -292,6 +305,7 @@ struct Targets {
 /// What a model reads and writes beside the mean.
 enum ModelTargets {
     Raster,
+    Double(Box<DoubleTargets>),
     Tree(TreeTargets),
     Path(PathTargets),
 }
@@ -307,7 +321,8 @@ impl Targets {
         let model = match model {
             Model::Tree => ModelTargets::Tree(TreeTargets::new(gpu, resources, &mean)?),
             Model::Path => ModelTargets::Path(PathTargets::new(gpu, resources, &mean)?),
-            Model::Single | Model::Double => ModelTargets::Raster,
+            Model::Double => ModelTargets::Double(Box::new(DoubleTargets::new(gpu, resources, &radiance, &mean)?)),
+            Model::Single => ModelTargets::Raster,
         };
         Ok(Self {
             accumulation: BindGroup::new(gpu, "accumulation", accumulation)?,
@@ -323,7 +338,7 @@ impl Targets {
     fn state(&self) -> Vec<&Image> {
         match &self.model {
             ModelTargets::Path(path) => path.state(&self.mean).to_vec(),
-            ModelTargets::Tree(_) | ModelTargets::Raster => Vec::new(),
+            ModelTargets::Tree(_) | ModelTargets::Double(_) | ModelTargets::Raster => Vec::new(),
         }
     }
 
@@ -331,6 +346,7 @@ impl Targets {
     fn counts(&self, commands: &mut Commands, mean: &[u8], samples: u32) -> Result<Option<Counts>> {
         Ok(match &self.model {
             ModelTargets::Raster => None,
+            ModelTargets::Double(double) => Some(Counts::of_samples(mean, &commands.read_image(&double.spread)?)),
             ModelTargets::Tree(tree) => Some(Counts::of_trees(mean, &commands.read_image(&tree.counts)?, samples)),
             ModelTargets::Path(path) => {
                 let counts = commands.read_image(&path.counts)?;
@@ -361,13 +377,17 @@ const NEXT_ESTIMATE: f64 = 1.2;
 
 /// Whether the error of the picture is as small as was asked for, in models that estimate it.
 fn is_precise(commands: &mut Commands, targets: &Targets, plan: &Plan, rounds: u32) -> Result<bool> {
-    let ModelTargets::Path(path) = &targets.model else { return Ok(false) };
+    let spread = match &targets.model {
+        ModelTargets::Path(path) => &path.spread,
+        ModelTargets::Double(double) => &double.spread,
+        ModelTargets::Raster | ModelTargets::Tree(_) => return Ok(false),
+    };
     // Rounds grow by a constant factor between estimates: those cost little then.
     let step = |rounds: u32| (f64::from(rounds) / f64::from(FIRST_ESTIMATE)).log(NEXT_ESTIMATE).floor();
     if plan.tolerance == f64::INFINITY || rounds < FIRST_ESTIMATE || step(rounds) == step(rounds - 1) {
         return Ok(false);
     }
-    let (mean, spread) = (commands.read_image(&targets.mean)?, commands.read_image(&path.spread)?);
+    let (mean, spread) = (commands.read_image(&targets.mean)?, commands.read_image(spread)?);
     Ok(counts::relative_error(&mean, &spread) < plan.tolerance)
 }
 

@@ -8,6 +8,7 @@ use glam::DVec3;
 use half::f16;
 use xxhash_rust::xxh3::Xxh3;
 
+use super::double::{Facet, Placed};
 use super::emitters;
 use super::geometry::{Draw, Geometry};
 use super::materials::{is_rough, materials, texels};
@@ -39,6 +40,10 @@ pub(super) struct Resources {
     pub(super) traced: Vec<Bind>,
     /// The table of what shines, for paths.
     pub(super) emitters: Bind,
+    /// The same with what only `double` reads.
+    pub(super) layered: Vec<Bind>,
+    /// The instances in the picture, of `double`.
+    pub(super) placed: Vec<Placed>,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
     pub(super) specialization: Specialization,
@@ -167,12 +172,22 @@ impl Resources {
             emitters::none()
         };
         let emitters = upload.buffer("emitters", &emitters)?;
+        let mut layered = Vec::new();
+        let mut placed = Vec::new();
+        if plan.model == Model::Double {
+            placed = Placed::all(scene, &geometry, &view, plan.size);
+            layered.clone_from(&bindings);
+            layered.push(upload.buffer("facets", &Facet::all(scene, &geometry))?);
+            layered.push(upload.buffer("instances in the picture", &placed)?);
+        }
         let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
         let fingerprint = upload.hash.as_ref().map(Xxh3::digest128);
         Ok(Self {
             group: BindGroup::new(upload.commands.gpu(), "scene", bindings)?,
             traced,
             emitters,
+            layered,
+            placed,
             draws: geometry.draws,
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)

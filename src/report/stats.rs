@@ -154,7 +154,7 @@ impl Stats {
                 pipelines: ms(rendered.pipelines),
             },
             wall_ms: ms(run.wall),
-            rays: counts.map(|counts| counts.rays),
+            rays: counts.and_then(|counts| counts.rays),
             peak_gpu_bytes: run.peak_gpu_bytes,
             discarded: counts.and_then(|counts| counts.discarded.as_deref()).map(DiscardedStats::new),
             stderr: counts.and_then(|counts| counts.stderr.as_deref()).and_then(StderrStats::new),
