@@ -17,8 +17,11 @@ struct Differentials {
 
 const Differentials NO_DIFFERENTIALS = Differentials(mat2x3(0.0), mat2x3(0.0));
 
-// Directions are no farther apart than opposite ones, and positions hardly farther than the scene is wide.
+// Directions are no farther apart than opposite ones, and positions hardly farther than the scene is wide. Where light is scattered so
+// wildly that derivatives grow beyond any bound, small shares of a pixel still have to see less than large ones, or the picture would
+// never converge.
 const float WIDEST = 2.0;
+const float WIDEST_OF_PIXEL = 4.0;
 
 // Cosines that are divided by are at least this: beyond, derivatives say nothing of a whole footprint.
 const float LEAST_COSINE = 1e-3;
@@ -31,7 +34,8 @@ float AwayFromZero(float cosine)
 vec3 Bounded(vec3 change)
 {
     change = clamp(change, vec3(-1e9), vec3(1e9)); // so that its square is a number
-    return change * (WIDEST / max(length(change), WIDEST));
+    float widest = min(WIDEST, WIDEST_OF_PIXEL * footprint);
+    return change * (widest / max(length(change), widest));
 }
 
 mat2x3 Bounded(mat2x3 change)
