@@ -52,7 +52,13 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut hardware = gpu.ray_query().then(|| TraceProbe::new(&gpu, &scene, Trace::Hardware)).transpose()?;
         let camera = camera_rays(&scene);
         let secondary = secondary_rays(&mut software, &camera)?;
-        for (name, rays) in [("camera", &camera), ("secondary", &secondary)] {
+        let rows = [
+            ("camera", &camera),
+            ("secondary", &secondary),
+            ("secondary, shuffled", &shuffled(&secondary)),
+            ("secondary, sorted", &sorted(&secondary)),
+        ];
+        for (name, rays) in rows {
             let mut embree = if embree { Some(Embree::start(&python, &scene, rays)?) } else { None };
             let mut rates = [Vec::new(), Vec::new(), Vec::new()];
             let rate = |probe: &mut TraceProbe| -> Result<f64, Box<dyn Error>> {
@@ -153,6 +159,26 @@ fn secondary_rays(probe: &mut TraceProbe, camera: &[Ray]) -> Result<Vec<Ray>, Bo
         all.extend(&rays);
     }
     Ok(all)
+}
+
+/// In an order without any.
+fn shuffled(rays: &[Ray]) -> Vec<Ray> {
+    let mut rays = rays.to_vec();
+    fastrand::Rng::with_seed(1).shuffle(&mut rays);
+    rays
+}
+
+/// Those beside each other that start close to each other in similar directions: what sorting rays could win, were it free.
+fn sorted(rays: &[Ray]) -> Vec<Ray> {
+    // Of a number from -2 to 2 the first ten binary digits, two places free between them.
+    let spread = |x: f64| (0..10).fold(0_u64, |bits, i| bits | ((((x + 2.0) * 256.0) as u64 >> i) & 1) << (3 * i));
+    let morton = |v: DVec3| spread(v.x) | spread(v.y) << 1 | spread(v.z) << 2;
+    let mut rays = rays.to_vec();
+    rays.sort_by_key(|ray| {
+        let direction = morton(ray.direction) >> 21;
+        direction << 30 | morton(ray.origin)
+    });
+    rays
 }
 
 fn has_embree(python: &str) -> bool {

@@ -8,18 +8,14 @@
 #include "trace.glsl"
 #include "arrival.glsl"
 #include "camera.glsl"
-#include "compensation.glsl"
 #include "effects.glsl"
 #include "emitters.glsl"
 #include "environment.glsl"
+#include "interface.glsl"
 #include "media.glsl"
-#include "opaque.glsl"
-#include "pane.glsl"
-#include "rough.glsl"
 #include "skylight.glsl"
 #include "sobol.glsl"
 #include "spectrum.glsl"
-#include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -31,15 +27,9 @@ layout(set = 0, binding = 15, rgba32f) uniform image2D mean;    // radiance
 layout(set = 0, binding = 16, rgba32f) uniform image2D counts;  // interfaces, rays
 layout(set = 0, binding = 17, rgba32f) uniform image2D spread;  // sum of squared differences of the batches' means from their mean, and their number
 
-// Pixels in a row of a workgroup's that one invocation takes, one after the other; as in src/passes/path.rs.
-const int PIXELS = 4;
-
 // From here on a faint path may end, with a probability that those going on make up for.
 const uint ROULETTE_DEPTH = 4;
 const float LEAST_SURVIVAL = 0.05;
-
-// The density of a direction that could not have been another.
-const float NO_PDF = -1.0;
 
 struct Ray {
     vec3 origin;
@@ -81,93 +71,6 @@ float PowerHeuristic(float pdf, float other)
 {
     float ratio = other / max(pdf, 1e-30);
     return 1.0 / (1.0 + ratio * ratio);
-}
-
-// An interface that a path has met, in the local frame.
-struct Met {
-    bool isOpaque;
-    bool isPane;
-    OpaqueSurface surface;
-    float alpha;
-    float etaI;
-    float etaT;
-    float scale;       // what single bounces between facets lose, given back
-    vec3 wi;
-};
-
-// What directions are worth: the BSDF times the cosine of wo, without the factor of the indices, and their density.
-struct Worth {
-    vec3 value;
-    float pdf;
-};
-
-Worth Evaluate(Met met, vec3 wo)
-{
-    if (met.isOpaque) return Worth(EvaluateOpaque(met.surface, met.wi, wo), OpaquePdf(met.surface, met.wi, wo));
-    RoughValue rough;
-    if (met.isPane) rough = EvaluatePane(met.wi, wo, met.alpha, met.etaI, met.etaT);
-    else rough = EvaluateRough(met.wi, wo, met.alpha, met.etaI, met.etaT);
-    bool reflected = wo.z > 0.0;
-    if (reflected ? !REFLECTION : !TRANSMISSION) return Worth(vec3(0.0), rough.pdf);
-    float ratio = reflected || met.isPane ? 1.0 : met.etaT / met.etaI;
-    return Worth(vec3(rough.value * met.scale * ratio * ratio), rough.pdf);
-}
-
-// A direction that a path goes on in.
-struct Next {
-    vec3 wo;
-    vec3 weight;
-    float pdf;        // NO_PDF: none other was possible
-};
-
-// Of an opaque surface: u chooses the direction, `choice` between what is mirrored and what is scattered below.
-Next SampleOpaque(OpaqueSurface surface, vec3 wi, vec2 u, float choice)
-{
-    float chance = SpecularChance(surface, wi);
-    bool isSpecular = choice < chance;
-    if (isSpecular && IsMirror(surface)) return Next(vec3(-wi.xy, wi.z), FacetReflectance(surface, wi.z) / chance, NO_PDF);
-    vec3 wo = isSpecular ? SpecularDirection(surface, wi, u) : DiffuseDirection(u);
-    float pdf = OpaquePdf(surface, wi, wo);
-    return Next(wo, pdf > 0.0 ? EvaluateOpaque(surface, wi, wo) / pdf : vec3(0.0), pdf);
-}
-
-Next SampleNext(Met met, vec2 u, float choice)
-{
-    if (met.isOpaque) return SampleOpaque(met.surface, met.wi, u, choice);
-    RoughSample rough;
-    if (met.isPane) rough = SamplePane(met.wi, met.alpha, met.etaI, met.etaT, vec3(u, choice));
-    else rough = SampleRough(met.wi, met.alpha, met.etaI, met.etaT, vec3(u, choice));
-    bool reflected = rough.wo.z > 0.0;
-    if (reflected ? !REFLECTION : !TRANSMISSION) rough.weight = 0.0;
-    float ratio = reflected || met.isPane ? 1.0 : met.etaT / met.etaI;
-    return Next(rough.wo, vec3(rough.weight * met.scale * ratio * ratio), rough.pdf);
-}
-
-bool IsRough(Material material)
-{
-    return material.roughness > SMOOTH_ROUGHNESS;
-}
-
-Met MetAt(Material material, Arrival arrival, Crossing crossing, vec3 wi)
-{
-    Met met;
-    met.isOpaque = crossing.isOpaque;
-    met.isPane = crossing.isPane;
-    met.surface = OpaqueSurface(vec3(0.0), vec3(0.0), 0.0, 1.0);
-    if (met.isOpaque) {
-        vec3 color = BaseColor(material, arrival.found, arrival.weights, mat2(0.0));
-        met.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
-    }
-    met.alpha = material.roughness * material.roughness;
-    met.etaI = crossing.etaI;
-    met.etaT = crossing.etaT;
-    met.wi = normalize(wi);
-    met.scale = 1.0;
-    if (ENERGY_COMPENSATION && !met.isOpaque) {
-        uint table = met.isPane ? material.albedoTable : RoughTable(material.albedoTables, met.etaI, met.etaT);
-        met.scale = RoughCompensation(table, met.wi.z);
-    }
-    return met;
 }
 
 // Moves the means of a pixel by a batch of samples, and what says how far batches are from each other: B. P. Welford, "Note on a Method
@@ -254,17 +157,11 @@ float WeightOfSurface(float pdf, float other)
     return SAMPLE_SURFACES ? PowerHeuristic(pdf, other * ChanceOfKind()) : 0.0;
 }
 
-// What the next ray is.
-const uint NEXT_PIXEL = 0;   // the camera's of the next pixel
-const uint NEXT_SAMPLE = 1;  // the camera's of this one once more
-const uint NEXT_RAY = 2;     // the path's, or the one towards a light
-
 void main()
 {
-    uint next = NEXT_PIXEL;
-    int column = -1;
-    ivec2 place = ivec2(0);
-    uint number = 0;
+    ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, firstRow);
+    if (any(greaterThanEqual(place, imageSize(mean)))) return;
+    Sequence sequence = Sequence(0, Pcg3d(uvec3(place, frame.seed) + uvec3(0, 0, sampleIndex * GOLDEN_STEP)).x);
     vec3 sum = vec3(0.0);
     uint interfaces = 0;
     uint rays = 0;
@@ -280,26 +177,17 @@ void main()
     float share = 1.0; // of the pixel's light that the path stands for
     bool isClear = true; // nothing spread it yet
     bool goesOn = false;
-    Sequence sequence = Sequence(0, 0);
     uint depth = 0;
     float pdf = NO_PDF;
     float travelled = 0.0; // from the interface before
     Wavelength wavelength = Wavelength(D_LINE, vec3(1.0));
     bool isColored = false;
     bool isBeyondGlass = false;
+    bool startsSample = true;
 
     for (;;) {
-        if (next == NEXT_PIXEL) {
-            if (++column == PIXELS) break;
-            place = ivec2(8 * (PIXELS * gl_WorkGroupID.x + column) + gl_LocalInvocationID.x, gl_GlobalInvocationID.y + firstRow);
-            if (any(greaterThanEqual(place, imageSize(mean)))) continue;
-            number = interfaces = rays = 0;
-            sum = vec3(0.0);
-            sequence.seed = Pcg3d(uvec3(place, frame.seed) + uvec3(0, 0, sampleIndex * GOLDEN_STEP)).x;
-            next = NEXT_SAMPLE;
-        }
-        if (next == NEXT_SAMPLE) {
-            sequence.index = number;
+        if (startsSample) {
+            startsSample = false;
             vec2 pixel = vec2(place) + Point(sequence, PAIR_PIXEL);
             path = Ray(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), LARGEST_FLOAT, atCamera, NOWHERE, NOWHERE, 0);
             if (DISPERSION) wavelength = ChooseWavelength(Point(sequence, PAIR_WAVELENGTH).x);
@@ -313,7 +201,6 @@ void main()
             share = 1.0;
             isClear = true;
             goesOn = true;
-            next = NEXT_RAY;
         }
         bool isLight = toLight;
         Ray ray = path;
@@ -467,14 +354,12 @@ void main()
             goesOn = true;
             continue;
         }
-        if (++number < samplesInBatch) {
-            next = NEXT_SAMPLE;
-        } else {
-            float scale = frame.cameraIndex * frame.cameraIndex;
-            AddBatch(place, scale * sum / float(number), float(interfaces) / float(number), float(rays) / float(number));
-            next = NEXT_PIXEL;
-        }
+        if (++sequence.index == samplesInBatch) break;
+        startsSample = true;
     }
+    float samples = float(samplesInBatch);
+    float scale = frame.cameraIndex * frame.cameraIndex;
+    AddBatch(place, scale * sum / samples, float(interfaces) / samples, float(rays) / samples);
 }
 
 #endif

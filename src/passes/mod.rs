@@ -123,49 +123,14 @@ pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u3
     let set_up = start.elapsed();
 
     let targets = Targets::new(gpu, plan.size, &resources, plan.model)?;
-    let state = targets.state();
-    let mut checkpoint = match &plan.checkpoint {
+    let checkpoint = match &plan.checkpoint {
         Some(path) => Some(Checkpoint::new(path, checkpoint::key(gpu, plan, trace, resources.fingerprint))?),
         None => None,
     };
-    let begun = match &checkpoint {
-        Some(checkpoint) => checkpoint.resume(&mut commands, &state)?,
-        None => Progress::default(),
-    };
-    let mut times = Times::default();
-    let (mut samples, mut resumed) = (0, 0);
-    let mut done = begun;
-    let mut is_enough = begun.rounds > 0 && is_precise(&mut commands, &targets, plan, begun.rounds)?;
-    for (rounds, round) in (1..).zip(sampling::rounds(plan)) {
-        if rounds <= begun.rounds {
-            (samples, resumed) = (samples + round.samples, resumed + round.samples);
-            continue;
-        }
-        if is_enough {
-            break;
-        }
-        let first_row = if rounds == begun.rounds + 1 { begun.rows } else { 0 };
-        let push = SamplePush { first_row, ..round.push };
-        let mut after = |commands: &mut Commands, rows| match &mut checkpoint {
-            Some(checkpoint) if checkpoint.is_due() => {
-                checkpoint.save(commands, &state, Progress { rounds: rounds - 1, rows })
-            }
-            _ => Ok(()),
-        };
-        times.add(passes.sample(&mut commands, &resources, &targets, &resources.draws, push, &mut after)?);
-        samples += round.samples;
-        progress(samples);
-        done = Progress { rounds, rows: 0 };
-        is_enough = is_spent(plan.budget, set_up, start.elapsed(), rounds - begun.rounds)
-            || is_precise(&mut commands, &targets, plan, rounds)?;
-    }
-    let mut warnings = Vec::new();
-    if let Some(checkpoint) = &mut checkpoint {
-        if done != begun {
-            checkpoint.save(&mut commands, &state, done)?;
-        }
-        warnings.extend(checkpoint.failure.take().map(|error| error.in_full()));
-    }
+    let is_spent = |rounds| is_spent(plan.budget, set_up, start.elapsed(), rounds);
+    let job = Job { plan, resources: &resources, targets: &targets, is_spent: &is_spent };
+    let Sampled { mut times, samples, resumed, warnings } =
+        passes.all_samples(&mut commands, &job, checkpoint, progress)?;
 
     let (display, time) = passes.display.run(&mut commands, &targets, plan)?;
     times.add(time);
@@ -199,6 +164,25 @@ struct Passes {
     model: ModelPass,
     display: Display,
     aov: Option<AovPass>,
+}
+
+/// What is sampled, and where to.
+struct Job<'a> {
+    plan: &'a Plan,
+    resources: &'a Resources,
+    targets: &'a Targets,
+    /// Whether the time is up after so many rounds.
+    is_spent: &'a dyn Fn(u32) -> bool,
+}
+
+/// What came of sampling.
+#[derive(Default)]
+struct Sampled {
+    times: Times,
+    samples: u32,
+    /// Of these, those that a checkpoint held.
+    resumed: u32,
+    warnings: Vec<String>,
 }
 
 /// The passes of one light transport model.
@@ -262,6 +246,54 @@ impl Passes {
             aov.run(commands, resources, &few, small)?;
         }
         Ok(passes)
+    }
+
+    /// Samples until there are enough, from where `checkpoint` is on, if there is one.
+    fn all_samples(
+        &mut self,
+        commands: &mut Commands,
+        &Job { plan, resources, targets, is_spent }: &Job<'_>,
+        mut checkpoint: Option<Checkpoint>,
+        progress: &mut dyn FnMut(u32),
+    ) -> crate::Result<Sampled> {
+        let state = targets.state();
+        let begun = match &checkpoint {
+            Some(checkpoint) => checkpoint.resume(commands, &state)?,
+            None => Progress::default(),
+        };
+        let mut sampled = Sampled::default();
+        let mut done = begun;
+        let mut is_enough = begun.rounds > 0 && is_precise(commands, targets, plan, begun.rounds)?;
+        for (rounds, round) in (1..).zip(sampling::rounds(plan)) {
+            if rounds <= begun.rounds {
+                sampled.samples += round.samples;
+                sampled.resumed += round.samples;
+                continue;
+            }
+            if is_enough {
+                break;
+            }
+            let first_row = if rounds == begun.rounds + 1 { begun.rows } else { 0 };
+            let push = SamplePush { first_row, ..round.push };
+            let mut after = |commands: &mut Commands, rows| match &mut checkpoint {
+                Some(checkpoint) if checkpoint.is_due() => {
+                    checkpoint.save(commands, &state, Progress { rounds: rounds - 1, rows })
+                }
+                _ => Ok(()),
+            };
+            sampled.times.add(self.sample(commands, resources, targets, &resources.draws, push, &mut after)?);
+            sampled.samples += round.samples;
+            progress(sampled.samples);
+            done = Progress { rounds, rows: 0 };
+            is_enough = is_spent(rounds - begun.rounds) || is_precise(commands, targets, plan, rounds)?;
+        }
+        if let Some(checkpoint) = &mut checkpoint {
+            if done != begun {
+                checkpoint.save(commands, &state, done)?;
+            }
+            sampled.warnings.extend(checkpoint.failure.take().map(|error| error.in_full()));
+        }
+        Ok(sampled)
     }
 
     fn sample(

@@ -11,9 +11,6 @@ use crate::gpu::{
 };
 use crate::options::Trace;
 
-/// Pixels of a row that one invocation takes: `PIXELS` of `shaders/path.glsl`.
-const PIXELS: u32 = 4;
-
 /// Hears how many rows of a batch are done.
 pub(super) type AfterRows<'a> = dyn FnMut(&mut Commands, u32) -> crate::Result<()> + 'a;
 
@@ -80,7 +77,7 @@ impl Path {
                     cmd.use_image(image, Use::Storage);
                 }
                 cmd.timed("path", |cmd| {
-                    let groups = [width.div_ceil(GROUP * PIXELS), rows / GROUP, 1];
+                    let groups = [width.div_ceil(GROUP), rows / GROUP, 1];
                     cmd.dispatch(&self.pipeline, &path.group, &SamplePush { first_row, ..push }, groups);
                 });
             })?);
@@ -99,7 +96,6 @@ mod tests {
     #[test]
     fn the_shader_has_the_same_sizes() {
         let shader = include_str!("../../shaders/path.glsl");
-        assert!(shader.contains(&format!("const int PIXELS = {PIXELS};")));
         assert!(shader.contains(&format!("layout(local_size_x = {GROUP}, local_size_y = {GROUP}) in;")));
     }
 }
