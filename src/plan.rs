@@ -236,3 +236,30 @@ impl Plan {
         })
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+    use crate::scene::{Overrides, PointLight};
+
+    #[test]
+    fn what_paths_cannot_meet_is_said() {
+        let unseen = |scene: &Scene, model| {
+            let args = RenderArgs { model: Some(model), ..RenderArgs::default() };
+            Plan::new(scene, &args).expect("a plan").unseen
+        };
+        let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        assert!(unseen(&scene, Model::Path).is_empty(), "no light");
+        scene.lights.push(PointLight { position: DVec3::Y, intensity: DVec3::ONE });
+        assert_eq!(unseen(&scene, Model::Path), [POINT_THROUGH_GLASS]);
+        assert!(unseen(&scene, Model::Tree).is_empty(), "of another model nothing is said");
+        for material in &mut scene.materials {
+            if let Surface::Dielectric(glass) = &mut material.surface {
+                glass.roughness = 0.2;
+            }
+        }
+        assert!(unseen(&scene, Model::Path).is_empty(), "rough glass spreads light");
+    }
+}

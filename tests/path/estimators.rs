@@ -66,7 +66,7 @@ fn estimators_agree_and_both_together_are_as_good_as_the_better_one() {
             let scene = lit(lamp, surface);
             let [both, lights, surfaces] = [Estimator::Both, Estimator::Lights, Estimator::Surfaces].map(|estimator| {
                 let seed = estimator as u64 + 1;
-                picture(&validated, &scene, Shot { depth: 8, seed, estimator, ..Shot::default() })
+                picture(&validated, &scene, Shot { samples: 128, depth: 8, seed, estimator, ..Shot::default() })
             });
             for (other, found) in [("lights", &lights), ("surfaces", &surfaces)] {
                 let error = (both.error_of_mean().powf(2.0) + found.error_of_mean().powf(2.0)).powf(0.5);
