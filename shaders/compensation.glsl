@@ -24,13 +24,16 @@ float RoughAlbedo(uint table, float cosThetaI)
     return mix(albedos[table + low], albedos[table + low + 1], share);
 }
 
+// Indices that differ by more are not those of one interface at two wavelengths.
+const float FARTHEST_TABLE = 0.2;
+
 // The table of an interface between two indices among the tables of a material: how many there are, then of each the indices and its
-// first node. The one that is closest, since an index that changes with the wavelength has none of its own.
+// first node. The one that is closest, since an index that changes with the wavelength has none of its own; 0: none is close.
 uint RoughTable(uint tables, float etaI, float etaT)
 {
     uint count = uint(albedos[tables]);
     uint table = 0;
-    float nearest = LARGEST_FLOAT;
+    float nearest = FARTHEST_TABLE;
     for (uint i = 0; i < count; ++i) {
         uint entry = tables + 1 + 3 * i;
         float distance = abs(albedos[entry] - etaI) + abs(albedos[entry + 1] - etaT);
@@ -42,11 +45,11 @@ uint RoughTable(uint tables, float etaI, float etaT)
     return table;
 }
 
-// The factor that gives back what is lost. Along a very rough surface close to index 1 nearly everything is, and a number above 0 is
+// The factor that gives back what is lost; 1 without a table. Along a very rough surface close to index 1 nearly everything is, and a number above 0 is
 // divided by.
 float RoughCompensation(uint table, float cosThetaI)
 {
-    return 1.0 / max(RoughAlbedo(table, cosThetaI), 1e-6);
+    return table == 0 ? 1.0 : 1.0 / max(RoughAlbedo(table, cosThetaI), 1e-6);
 }
 
 #endif

@@ -44,13 +44,15 @@ EmitterSample SampleEmitter(float choice, vec2 u)
     vec3 c = instance.objectToWorld * vec4(FetchCorner(triangle, 2), 1.0);
     vec2 place = 0.5 * u;
     if (u.y > u.x) place.y = u.y - place.x; else place.x = u.x - place.y;
-    vec3 normal = cross(b - a, c - a);
-    float size = length(normal);
+    // In lengths of the longer edge, whose squares are numbers.
+    float longer = max(max(length(b - a), length(c - a)), 1e-30);
+    vec3 normal = cross((b - a) / longer, (c - a) / longer);
+    float size = max(length(normal), 1e-30);
     EmitterSample chosen;
     chosen.position = a + place.x * (b - a) + place.y * (c - a);
     chosen.faceNormal = normal / size;
     chosen.found = Found(emitter.instance, emitter.triangle);
-    chosen.pdf = emitter.share / (0.5 * size);
+    chosen.pdf = emitter.share / (0.5 * size * longer * longer);
     return chosen;
 }
 
@@ -58,7 +60,7 @@ EmitterSample SampleEmitter(float choice, vec2 u)
 float EmitterPdf(vec3 emission, float distance, float cosine)
 {
     float luminance = dot(emission, vec3(0.2126, 0.7152, 0.0722));
-    return luminance / emittedPower * distance * distance / max(abs(cosine), 1e-6);
+    return luminance / emittedPower * distance * distance / max(abs(cosine), 1e-6); // seen on edge it is infinite
 }
 
 #endif

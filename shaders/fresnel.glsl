@@ -151,6 +151,18 @@ Interface FresnelDielectric(float cosThetaI, float etaI, float etaT)
     return FresnelDielectric(vec2(cosThetaI, 0.0), etaI, etaT);
 }
 
+// The share of light that a pane's two parallel faces reflect, from that of one, what bounces between them included.
+float PaneReflectance(float reflectance)
+{
+    return 2.0 * reflectance / (1.0 + reflectance);
+}
+
+// And the share that they let through.
+float PaneTransmittance(float reflectance, float transmittance)
+{
+    return transmittance / (1.0 + reflectance);
+}
+
 // Scalar product, as a pair: Ogita, Rump & Oishi 2005, algorithm 5.3.
 vec2 CompensatedDot(vec3 a, vec3 b)
 {

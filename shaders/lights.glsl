@@ -132,7 +132,8 @@ void PassThrough(inout LightRay light, Material material, Arrival arrival)
     float thinner = min(crossing.etaI, crossing.etaT);
     float denser = max(crossing.etaI, crossing.etaT);
     Interface crossed = FresnelDielectric(max(dot(-light.direction, normal), LEAST_SLOPE), thinner, denser);
-    light.throughput *= crossing.isPane && !crossed.total ? crossed.transmittance / (1.0 + crossed.reflectance) : crossed.transmittance;
+    bool isPane = crossing.isPane && !crossed.total;
+    light.throughput *= isPane ? PaneTransmittance(crossed.reflectance, crossed.transmittance) : crossed.transmittance;
     light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
     light.at = crossing.boundary.beyond;
     light.origin = LeaveFrom(arrival, light.direction);

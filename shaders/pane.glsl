@@ -8,12 +8,6 @@
 #include "fresnel.glsl"
 #include "rough.glsl"
 
-// The share of light that two parallel faces reflect, from that of one.
-float PaneReflectance(float reflectance)
-{
-    return 2.0 * reflectance / (1.0 + reflectance);
-}
-
 RoughValue EvaluatePane(vec3 wi, vec3 wo, float alpha, float etaI, float etaT)
 {
     if (wi.z <= 0.0 || wo.z == 0.0) return RoughValue(0.0, 0.0);

@@ -1,5 +1,5 @@
 // Paths of light from the camera on, at random: every effect, without bias up to the longest chain of interfaces. Multiple importance
-// sampling (Veach & Guibas 1995) joins directions chosen by a surface with those chosen by how bright the environment is.
+// sampling (Veach & Guibas 1995) joins directions chosen by a surface with those chosen by where light comes from.
 //
 // As in tree.glsl one loop does everything, a ray a turn, and radiance is that of a medium of index 1.
 #ifndef PATH_GLSL
@@ -127,7 +127,7 @@ bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pa
         light.reach = max(length(toLight), 1e-30);
         light.direction = toLight / light.reach;
         radiance = lights[number].intensity * (float(frame.lightCount) / (light.reach * light.reach * chance));
-    } else if (SeeksEmitters()) {
+    } else if (SeeksEmitters() && (INTERIOR || met.isOpaque)) { // else the surface would not find them either
         EmitterSample chosen = SampleEmitter(choice.y, u);
         vec3 toLight = chosen.position - arrival.position;
         light.reach = max(length(toLight), 1e-30);
@@ -237,6 +237,12 @@ void main()
             ends = ++ray.passed > MOST_PASSED;
         }
 
+        // From the first interface on whose index depends on the wavelength a path has a colour.
+        if (DISPERSION && disperses && !isColored && !isLight && !passes) {
+            ray.throughput *= wavelength.color;
+            isColored = true;
+        }
+
         if (isLight) {
             // Only what is not bent arrives.
             if (!meets) sum += ray.throughput * (ray.reach < LARGEST_FLOAT ? Absorbed(ray.at.medium, ray.reach) : vec3(1.0));
@@ -269,10 +275,6 @@ void main()
         bool scatters = !isLight && meets && !passes;
         if (scatters && (isOpaque || goesOn)) ++interfaces;
         if (scatters && goesOn) {
-            if (DISPERSION && disperses && !isColored) {
-                ray.throughput *= wavelength.color;
-                isColored = true;
-            }
             uint pair = PAIRS_BEFORE + PAIRS_OF_INTERFACE * depth + PAIRS_OF_BRANCH * branch;
             ++depth;
             isBeyondGlass = !isOpaque;
@@ -291,7 +293,7 @@ void main()
                 Met met = MetAt(material, arrival, crossing, wi * toWorld);
                 toLight = AskLight(met, toWorld, arrival, sequence, pair, ray, light);
                 if (toLight) {
-                    bool through = dot(light.direction, faceNormal) < 0.0;
+                    bool through = dot(light.direction, faceNormal) < 0.0 && INTERIOR;
                     light.at = through ? boundary.beyond : boundary.before;
                     // Light of points and of surfaces is given as it is in the medium that they lie in.
                     float index = through && !crossing.isPane ? crossing.etaT : crossing.etaI;

@@ -41,8 +41,8 @@ Scattered ScatterSmooth(Met met, vec3 wi)
     light.transmitted = refraction.crossed.transmittance;
     if (met.isPane) {
         // Both interfaces, and everything between them, summed.
-        light.transmitted = light.total ? 0.0 : light.transmitted / (1.0 + light.reflected);
-        light.reflected = 2.0 * light.reflected / (1.0 + light.reflected);
+        light.transmitted = light.total ? 0.0 : PaneTransmittance(light.reflected, light.transmitted);
+        light.reflected = PaneReflectance(light.reflected);
     }
     light.wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), met.faceNormal);
     light.wt = -wi;

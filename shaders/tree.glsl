@@ -246,8 +246,8 @@ void main()
                 transmittance = refraction.crossed.transmittance;
                 if (isPane) {
                     // Both interfaces, and everything between them, summed; what gets through goes straight on.
-                    transmittance = refraction.crossed.total ? 0.0 : transmittance / (1.0 + reflectance);
-                    reflectance = 2.0 * reflectance / (1.0 + reflectance);
+                    transmittance = refraction.crossed.total ? 0.0 : PaneTransmittance(reflectance, transmittance);
+                    reflectance = PaneReflectance(reflectance);
                 }
             }
 

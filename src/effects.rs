@@ -141,11 +141,13 @@ impl Effect {
     }
 
     /// Whether `model` simulates this by something simpler: its page in docs says what.
-    pub fn approximated_by(self, model: Model) -> bool {
-        matches!(
-            (model, self),
-            (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows) | (Model::Double, Self::Interior)
-        )
+    pub fn approximated_by(self, model: Model, scene: &Scene) -> bool {
+        match (model, self) {
+            (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows) => true,
+            (Model::Double, Self::Interior | Self::DirectLight) => true,
+            (Model::Double, Self::Roughness) => any_dielectric(scene, |d| d.thin_walled && d.roughness > SMOOTH),
+            _ => false,
+        }
     }
 
     /// Whether something in `scene` may show this.

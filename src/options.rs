@@ -183,7 +183,7 @@ ranges! {
 /// What is `None` was not given; [`RenderArgs::or`] joins two of them.
 #[derive(Clone, Debug, Default, PartialEq, clap::Args)]
 pub struct RenderArgs {
-    /// Light transport model; this version has single, tree and path [default: single]
+    /// Light transport model [default: single]
     #[arg(long, value_name = "NAME")]
     pub model: Option<Model>,
 

@@ -27,7 +27,7 @@ pub struct Plan {
     pub tolerance: f64,
     /// Whether environment and textures are averaged over a sample's share of its pixel, where rays are traced.
     pub footprints: bool,
-    /// How `path` looks for the light of the environment.
+    /// How `path` looks for the light of the environment and of surfaces that shine.
     pub estimator: Estimator,
     /// How rays are traced, where the user has a wish.
     pub trace: Option<Trace>,
@@ -55,7 +55,7 @@ pub struct Plan {
     pub options: RenderArgs,
 }
 
-/// How directions to the environment are chosen at surfaces that spread light. All estimate the same.
+/// How directions to lights are chosen at surfaces that spread light. All estimate the same.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Estimator {
     /// Where it is bright, and where the surface sends light: multiple importance sampling.
@@ -111,10 +111,7 @@ const DEPTH: u32 = 32;
 /// The same where a tolerance is asked for: long enough that few pixels miss it, short enough to end.
 const DEPTH_OF_TOLERANCE: u32 = 1024;
 
-/// The same in `double`, which finds longer chains less and less well.
-const DEPTH_OF_DOUBLE: u32 = 16;
-
-/// Throughput below which `tree` cuts a branch off, where no tolerance is asked for.
+/// Throughput below which `tree` cuts a branch off, where no tolerance is asked for, and `double` ends a chain.
 const CUTOFF: f64 = 0.005;
 
 impl Model {
@@ -128,13 +125,17 @@ impl Model {
 const POINT_THROUGH_GLASS: &str = "light of point lights through smooth glass, and their images in smooth surfaces";
 
 fn unseen(scene: &Scene, model: Model, effects: Effects) -> Vec<&'static str> {
+    let as_smooth = |roughness: f64| roughness <= SMOOTH || !effects.contains(Effect::Roughness);
     let is_smooth = |surface: &Surface| match surface {
-        Surface::Dielectric(glass) => glass.roughness <= SMOOTH && glass.ior != 1.0,
-        Surface::Opaque(opaque) => opaque.roughness <= SMOOTH && opaque.specular.max(opaque.metallic) > 0.0,
+        Surface::Dielectric(glass) => as_smooth(glass.roughness) && glass.ior != 1.0,
+        Surface::Opaque(opaque) => {
+            let mirrors = opaque.roughness <= SMOOTH && opaque.specular.max(opaque.metallic) > 0.0;
+            mirrors && effects.contains(Effect::Opaque)
+        }
     };
     let any_smooth = scene.objects.iter().any(|object| is_smooth(&scene.materials[object.material].surface));
-    let blind = model == Model::Path && effects.contains(Effect::DirectLight) && any_smooth;
-    if blind { vec![POINT_THROUGH_GLASS] } else { Vec::new() }
+    let lit = effects.contains(Effect::DirectLight) && Effect::DirectLight.called_for_by(scene);
+    if model == Model::Path && lit && any_smooth { vec![POINT_THROUGH_GLASS] } else { Vec::new() }
 }
 
 impl Plan {
@@ -186,7 +187,6 @@ impl Plan {
             }
         };
         let depth = match model {
-            Model::Double => DEPTH_OF_DOUBLE,
             Model::Tree if args.tolerance.is_some() => DEPTH_OF_TOLERANCE,
             _ => DEPTH,
         };
@@ -199,7 +199,8 @@ impl Plan {
         // In `tree` lights shine on opaque surfaces alone.
         let lit = share(true).contains(Effect::Opaque);
         let simplifies = lit || model != Model::Tree;
-        let approximate = share(true).iter().filter(|effect| simplifies && effect.approximated_by(model)).collect();
+        let approximate =
+            share(true).iter().filter(|effect| simplifies && effect.approximated_by(model, scene)).collect();
         Ok(Self {
             model,
             size,
@@ -255,11 +256,17 @@ mod tests {
         scene.lights.push(PointLight { position: DVec3::Y, intensity: DVec3::ONE });
         assert_eq!(unseen(&scene, Model::Path), [POINT_THROUGH_GLASS]);
         assert!(unseen(&scene, Model::Tree).is_empty(), "of another model nothing is said");
+        scene.lights[0].intensity = DVec3::ZERO;
+        assert!(unseen(&scene, Model::Path).is_empty(), "no light");
+        scene.lights[0].intensity = DVec3::ONE;
         for material in &mut scene.materials {
             if let Surface::Dielectric(glass) = &mut material.surface {
                 glass.roughness = 0.2;
             }
         }
         assert!(unseen(&scene, Model::Path).is_empty(), "rough glass spreads light");
+        let effects = Some("auto,-roughness".parse().expect("a selection"));
+        let args = RenderArgs { model: Some(Model::Path), effects, ..RenderArgs::default() };
+        assert_eq!(Plan::new(&scene, &args).expect("a plan").unseen, [POINT_THROUGH_GLASS], "as if it were smooth");
     }
 }

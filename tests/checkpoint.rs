@@ -77,29 +77,35 @@ fn ten_times_killed_a_render_ends_in_the_same_bytes() {
         return;
     }
     let folder = Folder::new();
-    let start = Instant::now();
-    succeeds(&folder.run("--samples 4096 -o whole.exr"));
-    let whole = start.elapsed();
-    // Long enough to save at least once, of a render that takes several of these.
+    // Long enough that the render is under way at every kill, wherever this runs.
+    let mut samples = 4096;
+    loop {
+        let start = Instant::now();
+        succeeds(&folder.run(&format!("--samples {samples} -o whole.exr")));
+        if start.elapsed() > Duration::from_secs(8) {
+            break;
+        }
+        samples *= 4;
+    }
+    let words = format!("--samples {samples} -o parts.exr --checkpoint state");
     let mut states = Vec::new();
     for i in 0..10 {
-        let mut child = folder
-            .render("--samples 4096 -o parts.exr --checkpoint state")
-            .stderr(Stdio::null())
-            .spawn()
-            .expect("the program starts");
+        let mut child = folder.render(&words).stderr(Stdio::null()).spawn().expect("the program starts");
+        // Long enough to save at least once.
         std::thread::sleep(Duration::from_millis(1300 + 100 * i));
+        let ended = child.try_wait().expect("a state").is_some();
         child.kill().expect("SIGKILL");
         child.wait().expect("the end");
-        states.push(fs::read(folder.path("state")).ok());
+        states.push((ended, fs::read(folder.path("state")).ok()));
     }
-    let distinct = states.windows(2).filter(|pair| pair[0] != pair[1]).count();
-    println!("whole in {whole:?}; {distinct} of 10 kills met a new state");
-    assert!(distinct > 0, "nothing was saved");
-    succeeds(&folder.run("--samples 4096 -o parts.exr --checkpoint state"));
+    let distinct = states.windows(2).filter(|pair| pair[0].1 != pair[1].1).count();
+    let ended = states.iter().filter(|(ended, _)| *ended).count();
+    println!("{samples} samples: {distinct} of 10 kills met a new state, {ended} came too late");
+    assert!(distinct > 0 && ended < 10, "nothing was saved, or nothing interrupted");
+    succeeds(&folder.run(&words));
     assert_eq!(folder.bytes("parts.exr"), folder.bytes("whole.exr"));
     // Once more: nothing is left to do.
-    succeeds(&folder.run("--samples 4096 -o again.exr --checkpoint state"));
+    succeeds(&folder.run(&format!("--samples {samples} -o again.exr --checkpoint state")));
     assert_eq!(folder.bytes("again.exr"), folder.bytes("whole.exr"));
 }
 
@@ -110,6 +116,13 @@ fn a_smaller_tolerance_goes_on_from_a_larger_one() {
     }
     let folder = Folder::new();
     succeeds(&folder.run("--tolerance 0.02 -o rough.exr --checkpoint state"));
+    // Killed in between: pixels of one picture have different numbers of samples.
+    for i in 0..3 {
+        let mut child = folder.render("--tolerance 0.01 -o fine.exr --checkpoint state").spawn().expect("a start");
+        std::thread::sleep(Duration::from_millis(1200 + 300 * i));
+        child.kill().expect("SIGKILL");
+        child.wait().expect("the end");
+    }
     succeeds(&folder.run("--tolerance 0.01 -o fine.exr --checkpoint state"));
     succeeds(&folder.run("--tolerance 0.01 -o direct.exr"));
     assert_eq!(folder.bytes("fine.exr"), folder.bytes("direct.exr"));
@@ -133,7 +146,17 @@ fn what_is_not_of_this_render_is_refused_and_kept() {
 
     let mut flipped = state.clone();
     *flipped.last_mut().expect("bytes") ^= 1;
-    let damaged: [(&[u8], &str); 4] = [
+    let longer = [&state[..], b"more"].concat();
+    let head = state.iter().position(|&byte| byte == b'\n').expect("a line");
+    let moved = |rounds: &str| {
+        let text = String::from_utf8_lossy(&state[..head]).replace("\"rounds\":16", &format!("\"rounds\":{rounds}"));
+        [text.as_bytes(), &state[head..]].concat()
+    };
+    let (earlier, later) = (moved("15"), moved("17"));
+    let damaged: [(&[u8], &str); 7] = [
+        (&longer, "something follows its end"),
+        (&earlier, "its checksum is another one"),
+        (&later, "it is farther than the render can be"),
         (&state[..state.len() - 1], "its end is missing"),
         (&flipped, "its checksum is another one"),
         (b"a letter to a friend", "is no checkpoint"),

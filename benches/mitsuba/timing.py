@@ -18,6 +18,8 @@ TARGETS = (1e-2, 1e-3)
 COUNTS = (1, 4, 16, 64)
 # Error falls so with the samples where nothing says otherwise.
 MONTE_CARLO_SLOPE = -1.0
+# An error that is told by a product of mean 0 may come out below 0.
+SMALLEST_ERROR = 1e-9
 # Samples of the picture that says how bright each pixel is, for relMSE.
 REFERENCE_SAMPLES = 256
 # Mitsuba's best for few samples.
@@ -33,6 +35,7 @@ class Curve:
     milliseconds: list = dataclasses.field(default_factory=list)
 
     def add(self, samples, error, milliseconds):
+        error = max(error, SMALLEST_ERROR)
         self.samples.append(samples)
         self.errors.append(error)
         self.milliseconds.append(milliseconds)

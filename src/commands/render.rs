@@ -53,8 +53,8 @@ impl RenderCommand {
         };
         let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
         let load = start.elapsed();
-        let idle = idle_options(&self.options, format);
         let mut plan = self.plan(&scene, format)?;
+        let idle = idle_options(&self.options.clone().or(scene.render.clone()), plan.model, format);
         scene.frame(f64::from(plan.size.width) / f64::from(plan.size.height));
         let options = &plan.options;
         let stats_file = options.stats.as_deref().map(OutputFile::new).transpose()?;
@@ -183,10 +183,9 @@ impl RenderCommand {
 }
 
 /// Notes on options that are understood and change nothing here.
-fn idle_options(options: &RenderArgs, format: ImageFormat) -> Vec<String> {
+fn idle_options(options: &RenderArgs, model: Model, format: ImageFormat) -> Vec<String> {
     let exr = format == ImageFormat::Exr;
-    let single = options.model.is_none_or(|model| model == Model::Single);
-    let double = options.model == Some(Model::Double);
+    let (single, double) = (model == Model::Single, model == Model::Double);
     let controls = "it is a control of model single";
     [
         (single && options.max_depth.is_some(), "--max-depth", "model single sees one interface"),

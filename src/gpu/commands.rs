@@ -152,16 +152,20 @@ impl Commands {
     /// An image of `desc` that holds `texels`, row after row.
     pub fn upload_image(&mut self, desc: &ImageDesc<'_>, texels: &[u8]) -> Result<Image> {
         let image = Image::new(&self.gpu, desc)?;
-        self.write_image(&image, texels)?;
+        self.fill_image(&image, desc.name, texels)?;
         Ok(image)
     }
 
     /// Fills `image`, which was made to be copied to, with `texels`, row after row.
     pub fn write_image(&mut self, image: &Image, texels: &[u8]) -> Result<()> {
+        self.fill_image(image, "texels", texels)
+    }
+
+    fn fill_image(&mut self, image: &Image, name: &str, texels: &[u8]) -> Result<()> {
         let rows = self.rows_at_once(image);
         let row_bytes = (image.texel_bytes() * u64::from(image.width())) as usize;
         for (first, band) in (0..).step_by(rows as usize).zip(texels.chunks(row_bytes * rows as usize)) {
-            let staging = self.staging("texels", band)?;
+            let staging = self.staging(name, band)?;
             let count = (band.len() / row_bytes) as u32;
             self.run(|cmd| cmd.copy_to_rows(&staging, image, first, count))?;
         }

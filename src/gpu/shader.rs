@@ -13,6 +13,13 @@ pub struct Shader {
     pub(super) spirv: &'static [u8],
 }
 
+impl Shader {
+    /// Its words, byte by byte.
+    pub fn spirv(&self) -> &'static [u8] {
+        self.spirv
+    }
+}
+
 /// Every entry point in `shaders/`.
 pub mod compiled {
     use super::Shader;

@@ -9,9 +9,9 @@ use std::path::Path;
 use std::time::{Duration, Instant};
 
 use serde::{Deserialize, Serialize};
-use xxhash_rust::xxh3::Xxh3;
+use xxhash_rust::xxh3::{Xxh3, xxh3_64};
 
-use crate::gpu::{Commands, Gpu, Image};
+use crate::gpu::{Commands, Gpu, Image, shaders};
 use crate::image::OutputFile;
 use crate::options::Trace;
 use crate::plan::{Budget, Plan};
@@ -37,8 +37,13 @@ pub(super) fn key(gpu: &Gpu, plan: &Plan, trace: Option<Trace>, scene: Option<u1
         Budget::Samples(samples) => samples.to_string(),
         Budget::Seconds { most, .. } => format!("as time allows, up to {most}"),
     };
+    let shader = match trace {
+        Some(Trace::Hardware) => &shaders::PATH_HARDWARE_COMP,
+        _ => &shaders::PATH_COMP,
+    };
     let entries = [
         ("version", env!("CARGO_PKG_VERSION").to_owned()),
+        ("shaders", format!("{:016x}", xxh3_64(shader.spirv()))),
         ("device", format!("{}, {}", device.name, device.driver)),
         ("--trace", trace.map_or("none", Trace::name).to_owned()),
         ("--size", plan.size.to_string()),
@@ -52,12 +57,19 @@ pub(super) fn key(gpu: &Gpu, plan: &Plan, trace: Option<Trace>, scene: Option<u1
 }
 
 /// How far a render is.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) struct Progress {
     /// Rounds that are done.
     pub(super) rounds: u32,
     /// Rows of the next one that are.
     pub(super) rows: u32,
+}
+
+impl Progress {
+    /// After so many of `height` rows of a round, counted from 1.
+    pub(super) fn within(round: u32, rows: u32, height: u32) -> Self {
+        if rows < height { Self { rounds: round - 1, rows } } else { Self { rounds: round, rows: 0 } }
+    }
 }
 
 /// The first line of a file.
@@ -69,6 +81,22 @@ struct Head {
     progress: Progress,
     bytes: u64,
     xxh3: String,
+}
+
+impl Head {
+    /// A checksum that has seen the head; the images follow.
+    fn hash(&self) -> Xxh3 {
+        let mut hash = Xxh3::new();
+        for (name, value) in &self.key {
+            hash.update(name.as_bytes());
+            hash.update(&[0]);
+            hash.update(value.as_bytes());
+            hash.update(&[0]);
+        }
+        hash.update(&self.progress.rounds.to_le_bytes());
+        hash.update(&self.progress.rows.to_le_bytes());
+        hash
+    }
 }
 
 /// Where a render is saved from time to time.
@@ -88,12 +116,19 @@ impl Checkpoint {
         Ok(Self { file, key, last: Instant::now(), pause: LEAST_WORK, failure: None })
     }
 
-    /// Puts what the file holds into `images`, and says how far it is: at the start where there is no file.
+    /// Puts what the file holds into `images`, and says how far it is: at the start where there is no file. Of a render of `most` rounds
+    /// and so many rows.
     ///
     /// # Errors
     ///
     /// If the file is no checkpoint, is damaged, or is that of another render.
-    pub(super) fn resume(&self, commands: &mut Commands, images: &[&Image]) -> Result<Progress> {
+    pub(super) fn resume(
+        &self,
+        commands: &mut Commands,
+        images: &[&Image],
+        most: Progress,
+        height: u32,
+    ) -> Result<Progress> {
         let path = self.file.path();
         let file = match File::open(path) {
             Ok(file) => file,
@@ -110,37 +145,40 @@ impl Checkpoint {
             let message = format!("is of version {}, this program reads {FORMAT}; delete it", head.vitrum_checkpoint);
             return Err(Error::input(path, 0, message));
         }
-        for ((name, held), (_, wanted)) in head.key.iter().zip(&self.key) {
+        for (held, wanted) in head.key.iter().zip(&self.key) {
             if held != wanted {
+                let ((name, held), (_, wanted)) = (held, wanted);
                 let message = format!(
                     "holds a render with {name} {held}, this one has {wanted}; go on with that one, or name another file"
                 );
                 return Err(Error::input(path, 0, message));
             }
         }
-        let sizes: Vec<u64> = images.iter().map(|image| image.bytes()).collect();
         let damaged = |what: &str| Error::input(path, 0, format!("is damaged: {what}; delete it to start over"));
-        if head.bytes != sizes.iter().sum::<u64>() || head.key.len() != self.key.len() {
-            return Err(damaged("it holds images of another size"));
+        let sizes: Vec<u64> = images.iter().map(|image| image.bytes()).collect();
+        if head.key.len() != self.key.len() || head.bytes != sizes.iter().sum::<u64>() {
+            return Err(damaged("its head is not that of its images"));
         }
-        let mut hash = Xxh3::new();
-        let mut all = Vec::new();
-        for size in sizes {
+        if head.progress > most || head.progress.rows >= height {
+            return Err(damaged("it is farther than the render can be"));
+        }
+        let mut hash = head.hash();
+        for (image, size) in images.iter().zip(sizes) {
             let mut texels = Vec::new();
             reader.by_ref().take(size).read_to_end(&mut texels).map_err(read)?;
             if texels.len() as u64 != size {
                 return Err(damaged("its end is missing"));
             }
             hash.update(&texels);
-            all.push(texels);
+            commands.write_image(image, &texels)?;
         }
         if format!("{:032x}", hash.digest128()) != head.xxh3 {
             return Err(damaged("its checksum is another one"));
         }
-        for (image, texels) in images.iter().zip(all) {
-            commands.write_image(image, &texels)?;
+        match reader.read(&mut [0]).map_err(read)? {
+            0 => Ok(head.progress),
+            _ => Err(damaged("something follows its end")),
         }
-        Ok(head.progress)
     }
 
     /// Whether it is time to save.
@@ -149,30 +187,28 @@ impl Checkpoint {
     }
 
     /// Saves `images`. That a disk is full is no reason to stop: the file before stays, and `failure` tells.
-    pub(super) fn save(&mut self, commands: &mut Commands, images: &[&Image], progress: Progress) -> Result<()> {
+    pub(super) fn save(&mut self, commands: &mut Commands, images: &[&Image], progress: Progress) {
         let start = Instant::now();
-        let mut hash = Xxh3::new();
+        self.failure = self.write(commands, images, progress).err();
+        self.last = Instant::now();
+        self.pause = LEAST_WORK.max(start.elapsed() * WORK_PER_SAVE);
+    }
+
+    fn write(&self, commands: &mut Commands, images: &[&Image], progress: Progress) -> Result<()> {
+        let bytes = images.iter().map(|image| image.bytes()).sum();
+        let mut head = Head { vitrum_checkpoint: FORMAT, key: self.key.clone(), progress, bytes, xxh3: String::new() };
+        let mut hash = head.hash();
         let mut all = Vec::new();
         for image in images {
             let texels = commands.read_image(image)?;
             hash.update(&texels);
             all.push(texels);
         }
-        let head = Head {
-            vitrum_checkpoint: FORMAT,
-            key: self.key.clone(),
-            progress,
-            bytes: images.iter().map(|image| image.bytes()).sum(),
-            xxh3: format!("{:032x}", hash.digest128()),
-        };
-        let written = self.file.write_with(|file| {
+        head.xxh3 = format!("{:032x}", hash.digest128());
+        self.file.write_with(|file| {
             serde_json::to_writer(&mut *file, &head)?;
             file.write_all(b"\n")?;
             all.iter().try_for_each(|texels| file.write_all(texels))
-        });
-        self.failure = written.err();
-        self.last = Instant::now();
-        self.pause = LEAST_WORK.max(start.elapsed() * WORK_PER_SAVE);
-        Ok(())
+        })
     }
 }

@@ -32,17 +32,40 @@ pub(super) fn table(scene: &Scene, geometry: &Geometry) -> Vec<u32> {
         }
     }
     shining.retain(|&(power, ..)| power > 0.0);
+    if shining.is_empty() {
+        return none();
+    }
     let whole: f64 = shining.iter().map(|&(power, ..)| power).sum();
     let mut table = header(shining.len() as u32, whole as f32);
-    let mut sum = 0.0;
-    for (power, instance, triangle) in shining {
-        // What is chosen is what is divided by: the distance of the starts as they are rounded.
-        let start = (sum / whole) as f32;
-        sum += power;
-        let share = (sum / whole) as f32 - start;
-        table.extend([start.to_bits(), share.to_bits(), instance, triangle]);
+    let shares = shares(&shining.iter().map(|&(power, ..)| power / whole).collect::<Vec<_>>());
+    let mut start = 0;
+    for (share, (_, instance, triangle)) in shares.into_iter().zip(shining) {
+        let part = |count: u32| (f64::from(count) / f64::from(STEPS)) as f32;
+        table.extend([part(start).to_bits(), part(share).to_bits(), instance, triangle]);
+        start += share;
     }
     table
+}
+
+/// Numbers from 0 to below 1 that a shader chooses by, as fine as they are.
+const STEPS: u32 = 1 << 24;
+
+/// Of all [`STEPS`] as many as each one's share is, but at least one: what shines is chosen, and as often as it says. Of more triangles
+/// than a quarter of that some are lost.
+fn shares(parts: &[f64]) -> Vec<u32> {
+    let least = u32::from(parts.len() < STEPS as usize / 4);
+    let mut shares: Vec<u32> =
+        parts.iter().map(|part| ((part * f64::from(STEPS)).round() as u32).clamp(least, STEPS)).collect();
+    // What rounding has put too much or too little is taken from the largest ones.
+    let mut order: Vec<usize> = (0..shares.len()).collect();
+    order.sort_by_key(|&i| std::cmp::Reverse(shares[i]));
+    let mut excess = shares.iter().map(|&share| i64::from(share)).sum::<i64>() - i64::from(STEPS);
+    for i in order {
+        let taken = excess.clamp(i64::from(shares[i]) - i64::from(STEPS), i64::from(shares[i] / 2));
+        shares[i] = (i64::from(shares[i]) - taken) as u32;
+        excess -= taken;
+    }
+    shares
 }
 
 #[cfg(test)]
@@ -70,10 +93,13 @@ mod tests {
         let mut end = 0.0;
         for words in table[4..].chunks(4) {
             let (start, share) = (f32::from_bits(words[0]), f32::from_bits(words[1]));
-            assert!(start == end && share >= 0.0, "{start} {share}");
+            assert!(start == end && share > 0.0, "{start} {share}");
             end = start + share;
         }
         assert_eq!(end, 1.0);
+        // A lamp that is next to nothing beside another one is chosen too.
+        assert_eq!(shares(&[1.0 - 1e-12, 1e-12]), [STEPS - 1, 1]);
+        assert_eq!(shares(&[1.0]), [STEPS]);
         // Half of the light is not there if half of the brightness is not.
         scene.materials[0].surface = shine(DVec3::new(0.0, 0.0, 1.5));
         let dimmer = super::table(&scene, &geometry(&scene));

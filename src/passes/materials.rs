@@ -78,10 +78,14 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<Materia
         };
         let &Dielectric { ior, roughness, .. } = glass;
         let (mut albedo_table, mut albedo_tables) = (0, 0);
-        if plan.effects.contains(Effect::EnergyCompensation) && is_rough(material) {
+        // In other media than air facets of index 1 lose light too.
+        let sees_media = matches!(plan.model, Model::Path | Model::Double);
+        let loses = is_rough(material) || sees_media && roughness > SMOOTH;
+        if plan.effects.contains(Effect::EnergyCompensation) && loses {
             let alpha = roughness * roughness;
+            let is_pane = glass.thin_walled && plan.effects.contains(Effect::ThinWalled);
             match plan.model {
-                Model::Path if glass.thin_walled => {
+                Model::Path if is_pane => {
                     // Both lobes of a pane are masked as those of a mirror, and lose the same.
                     albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: MIRROR });
                 }

@@ -258,12 +258,17 @@ impl Passes {
     ) -> crate::Result<Sampled> {
         let state = targets.state();
         let begun = match &checkpoint {
-            Some(checkpoint) => checkpoint.resume(commands, &state)?,
+            Some(checkpoint) => {
+                let most = Progress { rounds: sampling::rounds(plan).count() as u32, rows: 0 };
+                checkpoint.resume(commands, &state, most, plan.size.height)?
+            }
             None => Progress::default(),
         };
         let mut sampled = Sampled::default();
         let mut done = begun;
-        let mut is_enough = begun.rounds > 0 && is_precise(commands, targets, plan, begun.rounds)?;
+        // In the middle of a round pixels have different numbers of samples, and the uninterrupted render does not look.
+        let is_between = begun.rounds > 0 && begun.rows == 0;
+        let mut is_enough = is_between && is_precise(commands, targets, plan, begun.rounds)?;
         for (rounds, round) in (1..).zip(sampling::rounds(plan)) {
             if rounds <= begun.rounds {
                 sampled.samples += round.samples;
@@ -277,7 +282,8 @@ impl Passes {
             let push = SamplePush { first_row, ..round.push };
             let mut after = |commands: &mut Commands, rows| match &mut checkpoint {
                 Some(checkpoint) if checkpoint.is_due() => {
-                    checkpoint.save(commands, &state, Progress { rounds: rounds - 1, rows })
+                    checkpoint.save(commands, &state, Progress::within(rounds, rows, plan.size.height));
+                    Ok(())
                 }
                 _ => Ok(()),
             };
@@ -289,7 +295,7 @@ impl Passes {
         }
         if let Some(checkpoint) = &mut checkpoint {
             if done != begun {
-                checkpoint.save(commands, &state, done)?;
+                checkpoint.save(commands, &state, done);
             }
             sampled.warnings.extend(checkpoint.failure.take().map(|error| error.in_full()));
         }

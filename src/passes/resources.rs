@@ -40,7 +40,7 @@ pub(super) struct Resources {
     pub(super) traced: Vec<Bind>,
     /// The table of what shines, for paths.
     pub(super) emitters: Bind,
-    /// The same with what only `double` reads.
+    /// The group with what only `double` reads.
     pub(super) layered: Vec<Bind>,
     /// The instances in the picture, of `double`.
     pub(super) placed: Vec<Placed>,

@@ -1,6 +1,6 @@
 //! Under white light everything is white.
 
-use glam::DVec3;
+use glam::{DAffine3, DVec3};
 
 use vitrum::scene::{Dielectric, Opaque, Surface};
 
@@ -54,6 +54,20 @@ fn rough_bodies_are_white() {
             assert!((mean - 1.0).abs() < 0.01 + 4.0 * error, "index {ior}, roughness {roughness}: {mean} {error}");
         }
     }
+    validated.verdict();
+}
+
+/// A rough surface of index 1 loses light too where another medium surrounds it.
+#[test]
+fn a_rough_bubble_in_water_is_white() {
+    let Some(validated) = Validated::open() else { return };
+    let bubble = Dielectric { roughness: 0.4, priority: 1, ..glass(1.0) };
+    let bubble = Part::of(icosphere(4), Surface::Dielectric(bubble)).placed(DAffine3::from_scale(DVec3::splat(0.5)));
+    let scene = in_white(scene([Part::glass(icosphere(4), 1.33), bubble]));
+    let found = picture(&validated, &scene, Shot { depth: 1024, samples: 64, ..Shot::default() });
+    let error = found.error_of_mean().x;
+    println!("{:.4} +- {error:.4}", found.mean().x);
+    assert!((found.mean() - 1.0).abs().max_element() < 3e-3 + 4.0 * error, "{}", found.mean());
     validated.verdict();
 }
 
