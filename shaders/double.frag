@@ -15,6 +15,9 @@ layout(location = 0) out vec4 outRadiance; // and the number of interfaces
 // this.
 const float ROUGH_CUTOFF = 0.1;
 
+// Less than this part of the light is not worth a guess: it may see a sun where none is.
+const float LITTLE = 0.1;
+
 // Up to this alpha exits are searched for as thoroughly as those of smooth surfaces.
 const float THOROUGH_ALPHA = 0.01;
 
@@ -102,6 +105,10 @@ void main()
         uint at = triangle;
         vec3 wi = view;
         vec3 throughput = vec3(1.0);
+        vec3 found = vec3(0.0);
+        float left = 0.0;  // the body, of the light, but for what it absorbs
+        float stayed = 1.0;
+        bool isGuess = false;  // an exit was not met for sure
         float area = 0.0;
         met.normal = side * hit.normal;
         for (uint depth = 1; ; ++depth) {
@@ -117,19 +124,26 @@ void main()
             float leaving = isInside ? light.transmitted : light.reflected;
             float staying = isInside ? light.reflected : light.transmitted;
             float areaOut = area + (isInside ? light.areaT : light.areaR);
-            if (leaving > 0.0) radiance += throughput * leaving * LookTowards(leaves, areaOut, inAll, dither);
+            if (leaving > 0.0) found += throughput * leaving * LookTowards(leaves, areaOut, inAll, dither);
             throughput *= staying;
+            left += stayed * leaving;
+            stayed *= staying;
             area += isInside ? light.areaR : light.areaT;
 
-            Exit exit = Exit(false, 0, 0.0, vec2(0.0));
-            bool goesOn = !isAlone && depth < frame.maxDepth && Largest(throughput) > cutoff;
+            Exit exit = Exit(false, false, 0, 0.0, vec2(0.0));
+            bool isLittle = stayed < LITTLE * left;
+            bool goesOn = !isAlone && !(isLittle && isGuess) && depth < frame.maxDepth && Largest(throughput) > cutoff;
             if (goesOn) exit = FindExit(instance, place, at, origin, stays, thorough);
             if (!exit.found) {
-                // The rest is what the environment is there.
-                if (Largest(throughput) > 0.0) {
+                if (isLittle) {
+                    // What is left of the light is as what was found.
+                    found *= (left + stayed) / left;
+                } else {
+                    // The rest is what the environment is there.
                     bool fits = isInside && !isAlone && !light.total && leaving > 0.0;
-                    radiance += throughput * LookTowards(fits ? leaves : stays, area, inAll, dither);
+                    found += throughput * LookTowards(fits ? leaves : stays, area, inAll, dither);
                 }
+                radiance += found;
                 break;
             }
             if (ABSORPTION) throughput *= Transmittance(material.absorption, exit.distance);
@@ -139,10 +153,12 @@ void main()
             side = -1.0;
             met.normal = -NormalOf(instance, exit);
             isInside = true;
+            isGuess = isGuess || !exit.met;
             if (met.isRough) u = Point(Sequence(point, shift.z), depth);
         }
     }
     if (isBehind) radiance *= place.scale;
+    if (ABSORPTION && isBehind && !met.isPane) radiance *= Transmittance(material.absorption, hit.t * length(ray));
     if (DIRECT_LIGHT && !isBehind) radiance += float(count) * Highlights(material, hit, view);
     outRadiance = vec4(radiance, float(interfaces)) / float(count);
 }

@@ -37,6 +37,7 @@ const float LEAST_STEP = 1e-5;
 
 struct Exit {
     bool found;
+    bool met;       // the triangle itself, and not only its plane
     uint triangle;
     float distance;
     vec2 weights;   // of the triangle's second and third corner
@@ -76,7 +77,7 @@ Exit FindExit(Instance instance, Placed place, uint left, vec3 origin, vec3 dire
     float high = (-b + sqrt(max(b * b - dot(o, o) + 1.0, 0.0))) / speed;
     float least = LEAST_STEP / speed;
     float s = 0.0;
-    Exit exit = Exit(false, 0, 0.0, vec2(0.0));
+    Exit exit = Exit(false, false, 0, 0.0, vec2(0.0));
     ivec2 before = ivec2(-1);
     for (int i = 0; i < SEARCH_STEPS; ++i) {
         vec4 clip = from + s * along;
@@ -107,8 +108,9 @@ Exit FindExit(Instance instance, Placed place, uint left, vec3 origin, vec3 dire
         if (triangle != 0) {
             Facet facet = facets[instance.firstTriangle + triangle - 1];
             point = o + next * d;
-            exit = Exit(true, triangle - 1, next, WeightsAt(facet, point));
-            if (IsIn(exit.weights)) return exit;
+            vec2 weights = WeightsAt(facet, point);
+            exit = Exit(true, IsIn(weights), triangle - 1, next, weights);
+            if (exit.met) return exit;
             s = next;
         } else {
             s = 0.5 * (low + high);
@@ -129,7 +131,7 @@ Exit FindExit(Instance instance, Placed place, uint left, vec3 origin, vec3 dire
         vec2 weights = WeightsAt(facet, o + meets * d);
         if (!IsIn(weights)) continue;
         nearest = meets;
-        exit = Exit(true, triangle - 1, meets, weights);
+        exit = Exit(true, true, triangle - 1, meets, weights);
     }
     return exit;
 }

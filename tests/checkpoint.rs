@@ -138,9 +138,10 @@ fn what_is_not_of_this_render_is_refused_and_kept() {
     let whole = "--samples 16 -o image.exr --checkpoint state";
     succeeds(&folder.run(whole));
     let state = folder.bytes("state");
-    for (words, told) in [("--seed 1", "--seed 0"), ("--max-depth 5", "--max-depth 32"), ("--ior 1.4", "scene ")] {
+    for (words, told) in [("--seed 1", "--seed 0"), ("--max-depth 5", "--max-depth 32"), ("--ior 1.4", "another scene")]
+    {
         let line = refusal(&folder.run(&format!("{whole} {words}")));
-        assert!(line.contains("state: holds a render with") && line.contains(told), "{line}");
+        assert!(line.contains("state: holds a render ") && line.contains(told), "{line}");
     }
     assert_eq!(folder.bytes("state"), state);
 

@@ -136,7 +136,7 @@ impl RenderCommand {
         if stats.non_finite_pixels > 0 {
             talk.note(&format!("warning: {} pixels are not finite", stats.non_finite_pixels));
         }
-        if let Some(note) = cut_off(&plan, &stats) {
+        for note in [cut_off(&plan, &stats), too_rough(&plan, &rendered)].into_iter().flatten() {
             talk.note(&note);
         }
         talk.note(&summary(output.path(), &stats));
@@ -219,6 +219,17 @@ fn cut_off(plan: &Plan, stats: &Stats) -> Option<String> {
             None => format!("--tolerance or a --max-depth above {depth} follow more of it"),
         };
         format!("note: cut off was up to {most:.2e} of a pixel's light, {mean:.1e} in the mean; {advice}")
+    })
+}
+
+/// That an image has a larger error than was asked for, in models that estimate it.
+fn too_rough(plan: &Plan, rendered: &Rendered) -> Option<String> {
+    let stderr = rendered.counts.as_ref()?.stderr.as_ref()?;
+    let error = passes::relative_error(&rendered.radiance, stderr);
+    let missed = plan.tolerance.is_finite() && error.is_nan() || error > plan.tolerance;
+    missed.then(|| {
+        let (asked, samples) = (plan.tolerance, rendered.samples);
+        format!("note: --tolerance {asked}: the mean relative error is {error:.2e} after {samples} samples; more time or --samples lower it")
     })
 }
 

@@ -35,7 +35,7 @@ pub(super) fn key(gpu: &Gpu, plan: &Plan, trace: Option<Trace>, scene: Option<u1
     let device = gpu.info();
     let samples = match plan.budget {
         Budget::Samples(samples) => samples.to_string(),
-        Budget::Seconds { most, .. } => format!("as time allows, up to {most}"),
+        Budget::Seconds { most, .. } => format!("as needed (at most {most})"),
     };
     let shader = match trace {
         Some(Trace::Hardware) => &shaders::PATH_HARDWARE_COMP,
@@ -148,10 +148,13 @@ impl Checkpoint {
         for (held, wanted) in head.key.iter().zip(&self.key) {
             if held != wanted {
                 let ((name, held), (_, wanted)) = (held, wanted);
-                let message = format!(
-                    "holds a render with {name} {held}, this one has {wanted}; go on with that one, or name another file"
-                );
-                return Err(Error::input(path, 0, message));
+                let message = match name.as_str() {
+                    "scene" => "holds a render of another scene, or with other --ior, --roughness or --env".into(),
+                    "shaders" => "holds a render by another build of this program".into(),
+                    _ => format!("holds a render with {name} {held}, this one has {wanted}"),
+                };
+                let advice = "go on with that one, or name another file";
+                return Err(Error::input(path, 0, format!("{message}; {advice}")));
             }
         }
         let damaged = |what: &str| Error::input(path, 0, format!("is damaged: {what}; delete it to start over"));

@@ -22,14 +22,14 @@ impl Counts {
     }
 
     pub(super) fn of_paths(counts: &[u8], spread: &[u8], samples: u32) -> Self {
-        Self { stderr: Some(standard_errors(spread)), ..Self::new(counts, samples) }
+        Self { stderr: Some(errors(spread)), ..Self::new(counts, samples) }
     }
 
     /// Of `double`: each sample is a batch, and `mean` holds interfaces beside radiance.
     pub(super) fn of_samples(mean: &[u8], spread: &[u8]) -> Self {
         Self {
             discarded: None,
-            stderr: Some(standard_errors(spread)),
+            stderr: Some(errors(spread)),
             interfaces: texels(mean).iter().map(|&[.., interfaces]| interfaces).collect(),
             rays: None,
         }
@@ -48,19 +48,21 @@ impl Counts {
 }
 
 /// The mean over pixels and channels of standard error / (value + 0.1).
-pub(super) fn relative_error(mean: &[u8], spread: &[u8]) -> f64 {
-    let pairs = texels(mean);
-    let errors: f64 = pairs
-        .iter()
-        .zip(texels(spread))
-        .flat_map(|(&[r, g, b, _], texel)| [r, g, b].into_iter().zip(standard_error(texel)))
-        .map(|(value, error)| error / (f64::from(value) + 0.1))
-        .sum();
-    errors / (3 * pairs.len()) as f64
+pub fn relative_error(radiance: &[[f32; 3]], stderr: &[[f32; 3]]) -> f64 {
+    let pairs = radiance.iter().flatten().zip(stderr.iter().flatten());
+    let errors: f64 = pairs.map(|(&value, &error)| f64::from(error) / (f64::from(value) + 0.1)).sum();
+    errors / (3 * radiance.len()) as f64
 }
 
-fn standard_errors(spread: &[u8]) -> Vec<[f32; 3]> {
-    texels(spread).iter().map(|&texel| standard_error(texel).map(|error| error as f32)).collect()
+/// The same of images as the device has them.
+pub(super) fn relative_error_of(mean: &[u8], spread: &[u8]) -> f64 {
+    let radiance: Vec<_> = texels(mean).into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
+    relative_error(&radiance, &errors(spread))
+}
+
+/// Standard errors of all pixels.
+fn errors(spread: &[u8]) -> Vec<[f32; 3]> {
+    texels(spread).into_iter().map(|texel| standard_error(texel).map(|error| error as f32)).collect()
 }
 
 /// Of the mean of independent batches, from the sum of their squared differences from it and their number. Scaled by what Student's t

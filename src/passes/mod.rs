@@ -48,7 +48,7 @@ use single::Single;
 use tree::{Tree, TreeTargets};
 
 pub use aov::Aovs;
-pub use counts::Counts;
+pub use counts::{Counts, relative_error};
 pub use probe::{Hit, Leaks, Ray, TraceProbe};
 pub use sampling::pixel_offsets;
 
@@ -426,7 +426,7 @@ fn is_precise(commands: &mut Commands, targets: &Targets, plan: &Plan, rounds: u
         return Ok(false);
     }
     let (mean, spread) = (commands.read_image(&targets.mean)?, commands.read_image(spread)?);
-    Ok(counts::relative_error(&mean, &spread) < plan.tolerance)
+    Ok(counts::relative_error_of(&mean, &spread) < plan.tolerance)
 }
 
 /// Whether another round like those before would end after the time.
