@@ -147,7 +147,7 @@ impl Checkpoint {
         }
         for (held, wanted) in head.key.iter().zip(&self.key) {
             if held != wanted {
-                let ((name, held), (_, wanted)) = (held, wanted);
+                let (name, held, wanted) = (&held.0, &held.1, &wanted.1);
                 let message = match name.as_str() {
                     "scene" => "holds a render of another scene, or with other --ior, --roughness or --env".into(),
                     "shaders" => "holds a render by another build of this program".into(),
