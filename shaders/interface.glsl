@@ -75,6 +75,14 @@ Next SampleNext(Met met, vec2 u, float choice)
     return Next(rough.wo, vec3(rough.weight * met.scale * ratio * ratio), rough.pdf);
 }
 
+// Whether the environment is looked for on that side of an interface: where another index than 1 is there only what is bent comes from it,
+// but for holes in a mesh.
+bool IsUnderSky(Met met, bool above)
+{
+    float index = above || met.isPane ? met.etaI : met.etaT;
+    return index == 1.0 || !INTERIOR;
+}
+
 bool IsRough(Material material)
 {
     return material.roughness > SMOOTH_ROUGHNESS;

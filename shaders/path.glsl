@@ -115,8 +115,10 @@ bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pa
     vec2 u = Point(sequence, pair + PAIR_LIGHT);
     uint kind = uint(choice.x / chance);
     vec3 radiance = vec3(0.0);
+    bool isSky = false;
     float pdf = NO_PDF; // of a surface choosing it none
     if (SeeksSky() && kind-- == 0) {
+        isSky = true;
         SkySample chosen = SampleSky(u);
         light.direction = normalize(chosen.direction);
         pdf = chosen.pdf * chance;
@@ -143,7 +145,7 @@ bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pa
     vec3 wo = light.direction * toWorld;
     // On the same side of the surface and of its interpolated normal.
     bool above = (dot(light.direction, arrival.faceNormal) > 0.0) != arrival.behind;
-    if (above != (wo.z > 0.0)) return false;
+    if (above != (wo.z > 0.0) || (isSky && !IsUnderSky(met, above))) return false;
     Worth worth = Evaluate(met, wo);
     float weight = pdf != NO_PDF && SAMPLE_SURFACES ? PowerHeuristic(pdf, worth.pdf) : 1.0;
     light.throughput = path.throughput * worth.value * radiance * weight;
@@ -179,6 +181,7 @@ void main()
     bool goesOn = false;
     uint depth = 0;
     float pdf = NO_PDF;
+    bool isUnderSky = false;
     float travelled = 0.0; // from the interface before
     Wavelength wavelength = Wavelength(D_LINE, vec3(1.0));
     bool isColored = false;
@@ -252,7 +255,7 @@ void main()
             bool isSeen = frame.environmentVisible != 0 || depth > 0;
             if (isSeen) {
                 float weight = 1.0;
-                if (SeeksSky() && pdf > 0.0) weight = WeightOfSurface(pdf, SkyPdf(ray.direction));
+                if (SeeksSky() && pdf > 0.0 && isUnderSky) weight = WeightOfSurface(pdf, SkyPdf(ray.direction));
                 sum += weight * ray.throughput * SampleEnvironment(ray.direction, 0.0);
             }
             goesOn = false;
@@ -304,6 +307,7 @@ void main()
                 weight = sampled.weight;
                 pdf = sampled.pdf;
                 reflected = sampled.wo.z > 0.0;
+                isUnderSky = IsUnderSky(met, reflected);
                 // A direction that the face lies in the way of is bent; no light is asked for there.
                 vec3 side = reflected ? faceNormal : -faceNormal;
                 if (dot(direction, side) < LEAST_SLOPE) pdf = NO_PDF;

@@ -85,30 +85,50 @@ uint TakeNode(inout uvec2 group, uint octant)
 // Groups are pairs: a first number, and a bit for each of them that is left; nodes of one level have theirs in the
 // upper byte, and in the lowest which children are inner nodes.
 const uvec2 NOTHING = uvec2(0);
+const uvec2 ROOT = uvec2(0, 0x80000000u);
 const uint ANY_NODE = 0xff000000u;
+
+// A ray in the space of an instance, at the root of its mesh.
+struct Entry {
+    BoxRay ray;
+    ShearedRay sheared;
+    uint firstNode;
+    uint firstTriangle;
+};
+
+Entry EntryOf(uint instance, vec3 origin, vec3 direction)
+{
+    mat4x3 toObject = instances[instance].worldToObject;
+    vec3 localOrigin = toObject * vec4(origin, 1.0);
+    vec3 localDirection = mat3(toObject) * direction;
+    return Entry(BoxRayOf(localOrigin, localDirection), ShearRay(localOrigin, localDirection), instances[instance].firstNode,
+        instances[instance].firstTriangle);
+}
 
 bool Trace(vec3 origin, vec3 direction, Found left, out Found found)
 {
     uvec2 stack[TRACE_STACK];
     int top = 0;
     int ground = -1;  // height of the stack where the instance was entered; below 0: on the upper level
-    uvec2 group = uvec2(0, 0x80000000u);
+    uvec2 group = ROOT;
     uvec2 leaves = NOTHING;
-    BoxRay ray = BoxRayOf(origin, direction);
-    ShearedRay sheared;
-    uint firstNode = 0;
-    uint firstTriangle = 0;
     uint instance = 0;
+    Entry entry = Entry(BoxRayOf(origin, direction), ShearRay(origin, direction), 0, 0);
+    if (instances.length() == 1) {
+        // There is nothing to choose on the upper level.
+        entry = EntryOf(0, origin, direction);
+        ground = 0;
+    }
     float nearest = LARGEST_FLOAT;
     bool any = false;
 
     for (;;) {
         if ((group.y & ANY_NODE) != 0) {
-            uint node = firstNode + TakeNode(group, ray.octant);
+            uint node = entry.firstNode + TakeNode(group, entry.ray.octant);
             if ((group.y & ANY_NODE) != 0) stack[top++] = group;
             uvec2 groups;
             uint inner;
-            uint met = MeetChildren(node, ray, nearest, groups, inner);
+            uint met = MeetChildren(node, entry.ray, nearest, groups, inner);
             group = uvec2(groups.x, (met & ANY_NODE) | inner);
             leaves = uvec2(groups.y, met & ~ANY_NODE);
         }
@@ -121,21 +141,15 @@ bool Trace(vec3 origin, vec3 direction, Found left, out Found found)
                 if ((group.y & ANY_NODE) != 0) stack[top++] = group;
                 ground = top;
                 instance = number;
-                firstNode = instances[instance].firstNode;
-                firstTriangle = instances[instance].firstTriangle;
-                mat4x3 toObject = instances[instance].worldToObject;
-                vec3 localOrigin = toObject * vec4(origin, 1.0);
-                vec3 localDirection = mat3(toObject) * direction;
-                ray = BoxRayOf(localOrigin, localDirection);
-                sheared = ShearRay(localOrigin, localDirection);
-                group = uvec2(0, 0x80000000u);
+                entry = EntryOf(instance, origin, direction);
+                group = ROOT;
                 leaves = NOTHING;
                 break;
             }
             if (number == left.triangle && instance == left.instance) continue;
-            uint triangle = firstTriangle + number;
+            uint triangle = entry.firstTriangle + number;
             Meeting meeting;
-            if (MeetTriangle(sheared, FetchCorner(triangle, 0), FetchCorner(triangle, 1), FetchCorner(triangle, 2), meeting)
+            if (MeetTriangle(entry.sheared, FetchCorner(triangle, 0), FetchCorner(triangle, 1), FetchCorner(triangle, 2), meeting)
                 && meeting.t < nearest) {
                 nearest = meeting.t;
                 found = Found(instance, number);
@@ -145,8 +159,8 @@ bool Trace(vec3 origin, vec3 direction, Found left, out Found found)
         if ((group.y & ANY_NODE) != 0) continue;
         if (top == ground) {
             ground = -1;
-            firstNode = 0;
-            ray = BoxRayOf(origin, direction);
+            entry.firstNode = 0;
+            entry.ray = BoxRayOf(origin, direction);
         }
         if (top == 0) break;
         uvec2 next = stack[--top];
