@@ -1,7 +1,7 @@
 #version 460
-// Moves the mean of all samples by one more, as accumulate.comp does, and the sum of their squared differences from it: B. P. Welford,
-// "Note on a Method for Calculating Corrected Sums of Squares and Products", Technometrics 1962.
+// Moves the mean of all samples by one more, as accumulate.comp does, and the sum of their squared differences from it.
 #extension GL_EXT_samplerless_texture_functions : require
+#include "welford.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 layout(set = 0, binding = 0) uniform texture2D radiance;
@@ -15,13 +15,10 @@ void main()
     ivec2 pixel = ivec2(gl_GlobalInvocationID.xy);
     if (any(greaterThanEqual(pixel, imageSize(mean)))) return;
     vec4 value = texelFetch(radiance, pixel, 0);
-    vec4 moved = value;
-    vec3 squares = vec3(0.0);
+    Moments moments = Moments(value.rgb, vec3(0.0));
     if (sampleIndex != 0) {
-        vec4 before = imageLoad(mean, pixel);
-        moved = before + (value - before) / float(sampleIndex + 1);
-        squares = imageLoad(spread, pixel).rgb + (value - before).rgb * (value - moved).rgb;
+        moments = WithOneMore(Moments(imageLoad(mean, pixel).rgb, imageLoad(spread, pixel).rgb), sampleIndex, value.rgb);
     }
-    imageStore(mean, pixel, moved);
-    imageStore(spread, pixel, vec4(squares, float(sampleIndex + 1)));
+    imageStore(mean, pixel, vec4(moments.mean, value.a));
+    imageStore(spread, pixel, vec4(moments.squares, float(sampleIndex + 1)));
 }

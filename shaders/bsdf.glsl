@@ -156,7 +156,7 @@ vec3 ComputeRoughLight(SurfaceData data, vec3 viewDir, uvec2 shift, uint first, 
         if (data.behind || facet.total) continue;
         vec3 wt = RefractThroughFacet(wi, wm, cosI, facet.cosThetaT, 1.0, eta);
         if (TRANSMISSION && wt.z < 0.0) {
-            float denominator = (eta - 1.0) * (eta + 1.0) / (cosI + eta * facet.cosThetaT);
+            float denominator = RefractionDenominator(cosI, facet.cosThetaT, 1.0, eta);
             float pdf = FacetDensity(wi, wm, surface.alpha, /* reflected */ false, 1.0, cosI, facet.cosThetaT, eta, denominator);
             vec3 radiance = SampleEnvironment(surface.toWorld * wt, EnvironmentLod(1.0 / (inAll * pdf), dither));
             weight = facet.transmittance * MaskingGGX(-wt.z, SinSquared(wt), surface.alpha);

@@ -76,22 +76,22 @@ void main()
 
     vec3 view = -normalize(ray);
     mat3 normalToWorld = mat3(instance.normalToWorld);
-    Met met;
-    met.isPane = THIN_WALLED && material.kind == KIND_PANE;
-    met.isRough = ROUGHNESS && !met.isPane && material.roughness > SMOOTH_ROUGHNESS && material.refractionIndex != 1.0;
-    met.alpha = material.roughness * material.roughness;
-    met.tables = material.albedoTables;
+    Seen seen;
+    seen.isPane = THIN_WALLED && material.kind == KIND_PANE;
+    seen.isRough = ROUGHNESS && !seen.isPane && material.roughness > SMOOTH_ROUGHNESS && material.refractionIndex != 1.0;
+    seen.alpha = material.roughness * material.roughness;
+    seen.tables = material.albedoTables;
     // Of what is seen from the inside, and of panes, which have no inside, one interface is all.
-    bool isAlone = !INTERIOR || isBehind || met.isPane;
+    bool isAlone = !INTERIOR || isBehind || seen.isPane;
 
-    uint count = met.isRough ? frame.normals : 1;
+    uint count = seen.isRough ? frame.normals : 1;
     uint firstPoint = sampleIndex * frame.normals;
     bool known = frame.normalsInAll != 0;
     float inAll = float(known ? frame.normalsInAll : firstPoint + frame.normals);
     uvec3 shift = Pcg3d(uvec3(pixel, frame.seed + (known ? 0 : sampleIndex)));
 
-    float cutoff = met.isRough ? max(frame.cutoff, min(met.alpha, ROUGH_CUTOFF)) : frame.cutoff;
-    bool thorough = !met.isRough || met.alpha <= THOROUGH_ALPHA;
+    float cutoff = seen.isRough ? max(frame.cutoff, min(seen.alpha, ROUGH_CUTOFF)) : frame.cutoff;
+    bool thorough = !seen.isRough || seen.alpha <= THOROUGH_ALPHA;
 
     vec3 radiance = vec3(0.0);
     uint interfaces = 0;
@@ -99,7 +99,7 @@ void main()
         uint point = firstPoint + k;
         float dither = UnitFloat(point * GOLDEN_STEP + shift.x);
         vec2 u = PlasticPoint(point, shift.xy);
-        bool isInside = isBehind && !met.isPane;
+        bool isInside = isBehind && !seen.isPane;
         float side = isBehind ? -1.0 : 1.0;
         vec3 origin = hit.position;
         uint at = triangle;
@@ -110,12 +110,12 @@ void main()
         float stayed = 1.0;
         bool isGuess = false;  // an exit was not met for sure
         float area = 0.0;
-        met.normal = side * hit.normal;
+        seen.normal = side * hit.normal;
         for (uint depth = 1; ; ++depth) {
-            met.faceNormal = side * normalize(normalToWorld * facets[instance.firstTriangle + at].outside.xyz);
-            met.etaI = isInside ? material.refractionIndex : 1.0;
-            met.etaT = isInside ? 1.0 : material.refractionIndex;
-            Scattered light = Scatter(met, wi, u);
+            seen.faceNormal = side * normalize(normalToWorld * facets[instance.firstTriangle + at].outside.xyz);
+            seen.etaI = isInside ? material.refractionIndex : 1.0;
+            seen.etaT = isInside ? 1.0 : material.refractionIndex;
+            Scattered light = Scatter(seen, wi, u);
             ++interfaces;
 
             // What leaves the body here, and what goes on in it.
@@ -151,14 +151,14 @@ void main()
             at = exit.triangle;
             wi = -stays;
             side = -1.0;
-            met.normal = -NormalOf(instance, exit);
+            seen.normal = -NormalOf(instance, exit);
             isInside = true;
             isGuess = isGuess || !exit.met;
-            if (met.isRough) u = Point(Sequence(point, shift.z), depth);
+            if (seen.isRough) u = Point(Sequence(point, shift.z), depth);
         }
     }
     if (isBehind) radiance *= place.scale;
-    if (ABSORPTION && isBehind && !met.isPane) radiance *= Transmittance(material.absorption, hit.t * length(ray));
+    if (ABSORPTION && isBehind && !seen.isPane) radiance *= Transmittance(material.absorption, hit.t * length(ray));
     if (DIRECT_LIGHT && !isBehind) radiance += float(count) * Highlights(material, hit, view);
     outRadiance = vec4(radiance, float(interfaces)) / float(count);
 }

@@ -16,6 +16,7 @@
 #include "skylight.glsl"
 #include "sobol.glsl"
 #include "spectrum.glsl"
+#include "welford.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -73,23 +74,18 @@ float PowerHeuristic(float pdf, float other)
     return 1.0 / (1.0 + ratio * ratio);
 }
 
-// Moves the means of a pixel by a batch of samples, and what says how far batches are from each other: B. P. Welford, "Note on a Method
-// for Calculating Corrected Sums of Squares and Products", Technometrics 1962.
+// Moves the means of a pixel by a batch of samples, and what says how far batches are from each other.
 void AddBatch(ivec2 place, vec3 value, float interfaces, float rays)
 {
-    vec3 squares = vec3(0.0);
+    Moments moments = Moments(value, vec3(0.0));
     vec4 count = vec4(interfaces, rays, 0.0, 0.0);
-    vec3 moved = value;
     if (sampleIndex != 0) {
-        float batches = float(sampleIndex + 1);
-        vec3 before = imageLoad(mean, place).rgb;
-        moved = before + (value - before) / batches;
-        squares = imageLoad(spread, place).rgb + (value - before) * (value - moved);
+        moments = WithOneMore(Moments(imageLoad(mean, place).rgb, imageLoad(spread, place).rgb), sampleIndex, value);
         vec4 counted = imageLoad(counts, place);
-        count = counted + (count - counted) / batches;
+        count = counted + (count - counted) / float(sampleIndex + 1);
     }
-    imageStore(mean, place, vec4(moved, 1.0));
-    imageStore(spread, place, vec4(squares, float(sampleIndex + 1)));
+    imageStore(mean, place, vec4(moments.mean, 1.0));
+    imageStore(spread, place, vec4(moments.squares, float(sampleIndex + 1)));
     imageStore(counts, place, count);
 }
 

@@ -55,6 +55,12 @@ float FacetDensity(vec3 wi, vec3 wm, float alpha, bool reflected, float share, f
     return min(density, LARGEST_FLOAT); // close to index 1 lobes are narrower than 32 bits can say
 }
 
+// That denominator, of a facet that refracts.
+float RefractionDenominator(float cosI, float cosT, float etaI, float etaT)
+{
+    return (etaT - etaI) * (etaT + etaI) / (etaI * cosI + etaT * cosT);
+}
+
 // Value and density of one pair of directions.
 RoughValue EvaluateRough(vec3 wi, vec3 wo, float alpha, float etaI, float etaT)
 {
@@ -113,7 +119,7 @@ RoughSample SampleRough(vec3 wi, float alpha, float etaI, float etaT, vec3 u)
     float pdf = EvaluateRough(wi, wo, alpha, etaI, etaT).pdf;
     if (pdf == 0.0) {
         float share = reflected ? facet.reflectance : facet.transmittance;
-        float denominator = (etaT - etaI) * (etaT + etaI) / (etaI * cosI + etaT * facet.cosThetaT);
+        float denominator = RefractionDenominator(cosI, facet.cosThetaT, etaI, etaT);
         pdf = FacetDensity(wi, wm, alpha, reflected, share, cosI, facet.cosThetaT, etaT, denominator);
     }
     return RoughSample(wo, MaskingGGX(abs(wo.z), SinSquared(wo), alpha) * ratio * ratio, pdf);

@@ -6,7 +6,7 @@ use vitrum::plan::Estimator;
 use vitrum::scene::{Dielectric, Environment, Opaque, Panorama, Scene, Surface, Surroundings};
 
 use crate::common::Validated;
-use crate::device::{Shot, picture};
+use crate::device::{Picture, Shot, picture};
 use crate::shapes::{Part, glass, icosphere, rectangle, scene};
 
 /// What lights a scene.
@@ -58,26 +58,51 @@ fn lit(lamp: Lamp, surface: Surface) -> Scene {
     }
 }
 
+/// Pictures by both, by lights alone and by surfaces alone, whose means agree.
+fn agreeing(validated: &Validated, scene: &Scene, name: &str) -> [Picture; 3] {
+    let pictures = [Estimator::Both, Estimator::Lights, Estimator::Surfaces].map(|estimator| {
+        let seed = estimator as u64 + 1;
+        picture(validated, scene, Shot { samples: 128, depth: 8, seed, estimator, ..Shot::default() })
+    });
+    let [both, lights, surfaces] = &pictures;
+    for (other, found) in [("lights", lights), ("surfaces", surfaces)] {
+        let error = (both.error_of_mean().powf(2.0) + found.error_of_mean().powf(2.0)).powf(0.5);
+        let z = ((both.mean() - found.mean()) / error).abs().max_element();
+        println!("{name}, {other}: z {z:.2}");
+        assert!(z < 4.0, "{name}: both {} {other} {}", both.mean(), found.mean());
+    }
+    pictures
+}
+
 #[test]
 fn estimators_agree_and_both_together_are_as_good_as_the_better_one() {
     let Some(validated) = Validated::open() else { return };
     for lamp in [Lamp::Texels(1), Lamp::Texels(6), Lamp::Surface(0.2), Lamp::Surface(1.0)] {
         for (name, surface) in bodies() {
-            let scene = lit(lamp, surface);
-            let [both, lights, surfaces] = [Estimator::Both, Estimator::Lights, Estimator::Surfaces].map(|estimator| {
-                let seed = estimator as u64 + 1;
-                picture(&validated, &scene, Shot { samples: 128, depth: 8, seed, estimator, ..Shot::default() })
-            });
-            for (other, found) in [("lights", &lights), ("surfaces", &surfaces)] {
-                let error = (both.error_of_mean().powf(2.0) + found.error_of_mean().powf(2.0)).powf(0.5);
-                let z = ((both.mean() - found.mean()) / error).abs().max_element();
-                println!("{lamp:?}, {name}, {other}: z {z:.2}");
-                assert!(z < 4.0, "{lamp:?}, {name}: both {} {other} {}", both.mean(), found.mean());
-            }
+            let name = format!("{lamp:?}, {name}");
+            let [both, lights, surfaces] = agreeing(&validated, &lit(lamp, surface), &name);
             let ratio = both.variance() / lights.variance().min(surfaces.variance());
-            println!("{lamp:?}, {name}: variance {ratio:.2} of the better one");
-            assert!(ratio < 1.3, "{lamp:?}, {name}: {ratio}");
+            println!("{name}: variance {ratio:.2} of the better one");
+            assert!(ratio < 1.3, "{name}: {ratio}");
         }
+    }
+    validated.verdict();
+}
+
+/// The environment is not looked for from inside of glass, for what comes from there is bent, but through a hole it is seen.
+#[test]
+fn light_that_enters_by_a_hole_is_found() {
+    let Some(validated) = Validated::open() else { return };
+    let mut shell = icosphere(4);
+    shell.triangles.retain(|triangle| triangle.iter().any(|&vertex| shell.positions[vertex as usize][1] < 0.3));
+    let frosted = Dielectric { roughness: 0.6, ..glass(1.5) };
+    let open = Part::of(shell, Surface::Dielectric(frosted.clone()));
+    // A bubble of air: from its wall the sky is looked for, and hidden.
+    let bubble = Part::of(icosphere(4), Surface::Dielectric(Dielectric { priority: 1, ..glass(1.0) }))
+        .placed(DAffine3::from_scale(DVec3::splat(0.5)));
+    let body = Part::of(icosphere(4), Surface::Dielectric(frosted));
+    for (name, scene) in [("open ball", scene([open])), ("ball with a bubble", scene([body, bubble]))] {
+        agreeing(&validated, &Scene { environment: surroundings(6), ..scene }, name);
     }
     validated.verdict();
 }
