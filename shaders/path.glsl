@@ -43,6 +43,9 @@ struct Ray {
     uint passed;      // boundaries in a row between equal indices
 };
 
+// Whether both ways are followed beyond the first interface too: not where opaque surfaces share the noise.
+layout(constant_id = 68) const bool BRANCHES = true;
+
 // As long as a pixel is seen through smooth glass alone both what an interface reflects and what it transmits are followed: one of them is rare at
 // most angles, and would make most of the noise. One waits for the other.
 struct Waiting {
@@ -53,8 +56,7 @@ struct Waiting {
 };
 const int MOST_WAITING = 4;
 
-// Less of a pixel's light is not worth a path of its own: what water reflects of glass, 0.4 %, is. Among opaque surfaces, which share their
-// noise, only that of the first interface is.
+// Less of a pixel's light is not worth a path of its own: what water reflects of glass, 0.4 %, is.
 const float LEAST_SHARE = 0.002;
 
 // Pairs of numbers that a path takes: for the camera, and for each interface.
@@ -318,7 +320,7 @@ void main()
                 if (!crossing.isPane && !refraction.crossed.total) wt = DirectionAbove(normalize(refraction.wt), -faceNormal);
                 if (reflected ? !REFLECTION : !TRANSMISSION) weight = vec3(0.0);
                 float smaller = min(reflectance, 1.0 - reflectance) * share;
-                bool isWorthIt = depth == 1 ? smaller > 0.0 : !OPAQUE && smaller > LEAST_SHARE && top < MOST_WAITING;
+                bool isWorthIt = depth == 1 ? smaller > 0.0 : BRANCHES && smaller > LEAST_SHARE && top < MOST_WAITING;
                 if (isClear && isWorthIt && REFLECTION && TRANSMISSION) {
                     reflected = true;
                     weight = vec3(reflectance);

@@ -1,12 +1,13 @@
-//! The effects, as one table: what each is called, what in a scene calls for it, and which models honour it.
+//! The effects, as one table: what each is called, what in a scene calls for it and why, and which models honour it.
 //!
 //! An effect that is off is compiled out: its bit sets a specialization constant of the shaders.
 
+use std::collections::BTreeSet;
 use std::fmt;
 use std::str::FromStr;
 
 use crate::options::Model;
-use crate::scene::{Dielectric, Material, Object, Scene, Surface};
+use crate::scene::{Dielectric, Scene, Surface};
 
 /// A row of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -49,75 +50,175 @@ struct Row {
     models: &'static [Model],
     /// Without this it changes nothing, and is not simulated.
     needs: Option<Effect>,
-    called_for: fn(&Scene) -> bool,
+    calls: Calls,
+    /// Why a scene does without it.
+    absent: &'static str,
+}
+
+/// What in a scene calls for an effect.
+#[derive(Clone, Copy)]
+enum Calls {
+    /// A surface that an object wears, if this says why.
+    Surface(fn(&Surface) -> Option<String>),
+    /// A light that shines on something.
+    Light,
+    /// Bodies that overlap, or the camera in one.
+    Overlap,
 }
 
 /// THE table. Detection is conservative: an effect that might show is called for.
 const TABLE: [Row; 13] = {
+    use Calls::{Light, Overlap, Surface};
     use Effect::*;
     use Model::{Double, Path, Single, Tree};
     const TRACED: &[Model] = &[Tree, Path];
     const ALL: &[Model] = &[Single, Double, Tree, Path];
     const ROUGH: &[Model] = &[Single, Double, Path];
     const INSIDE: &[Model] = &[Double, Tree, Path];
-    const fn row(effect: Effect, name: &'static str, models: &'static [Model], called_for: fn(&Scene) -> bool) -> Row {
+    const NO_GLASS: &str = "no object is of glass";
+    const NO_LIGHT: &str = "no point light shines on anything";
+    const SMOOTH_GLASS: &str = "no glass is rougher than 0.01";
+    const fn row(
+        effect: Effect,
+        name: &'static str,
+        models: &'static [Model],
+        calls: Calls,
+        absent: &'static str,
+    ) -> Row {
         let needs = if matches!(effect, EnergyCompensation) { Some(Roughness) } else { None };
-        Row { effect, name, models, needs, called_for }
+        Row { effect, name, models, needs, calls, absent }
     }
     [
-        row(Reflection, "reflection", ALL, |s| any_dielectric(s, |_| true)),
-        row(Transmission, "transmission", ALL, |s| any_dielectric(s, |_| true)),
-        row(Interior, "interior", INSIDE, |s| any_dielectric(s, |_| true)),
-        row(DirectLight, "direct-light", ALL, has_light),
-        row(Shadows, "shadows", TRACED, has_light),
-        row(Roughness, "roughness", ROUGH, |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
-        row(EnergyCompensation, "energy-compensation", ROUGH, |s| any_dielectric(s, |d| d.roughness > SMOOTH)),
-        row(Absorption, "absorption", INSIDE, |s| any_dielectric(s, absorbs)),
-        row(Dispersion, "dispersion", TRACED, |s| any_dielectric(s, disperses)),
-        row(Nesting, "nesting", TRACED, nests),
-        row(ThinWalled, "thin-walled", INSIDE, |s| any_dielectric(s, |d| d.thin_walled)),
-        row(Opaque, "opaque", TRACED, |s| surfaces(s).any(|x| matches!(x, Surface::Opaque(_)))),
-        row(Textures, "textures", TRACED, |s| {
-            surfaces(s).any(|x| matches!(x, Surface::Opaque(opaque) if opaque.base_color_texture.is_some()))
-        }),
+        row(Reflection, "reflection", ALL, Surface(glass), NO_GLASS),
+        row(Transmission, "transmission", ALL, Surface(glass), NO_GLASS),
+        row(Interior, "interior", INSIDE, Surface(glass), NO_GLASS),
+        row(DirectLight, "direct-light", ALL, Light, NO_LIGHT),
+        row(Shadows, "shadows", TRACED, Light, NO_LIGHT),
+        row(Roughness, "roughness", ROUGH, Surface(rough), SMOOTH_GLASS),
+        row(EnergyCompensation, "energy-compensation", ROUGH, Surface(rough), SMOOTH_GLASS),
+        row(
+            Absorption,
+            "absorption",
+            INSIDE,
+            Surface(absorbs),
+            "no body of glass has a colour and a finite attenuation distance",
+        ),
+        row(
+            Dispersion,
+            "dispersion",
+            TRACED,
+            Surface(disperses),
+            "no body of glass has an index that changes with the wavelength",
+        ),
+        row(Nesting, "nesting", TRACED, Overlap, "no bodies of glass overlap, and the camera is in none"),
+        row(ThinWalled, "thin-walled", INSIDE, Surface(thin_walled), "no glass is thin-walled"),
+        row(Opaque, "opaque", TRACED, Surface(opaque), "every object is of glass"),
+        row(Textures, "textures", TRACED, Surface(textured), "no opaque object wears an image"),
     ]
 };
 
-/// The surfaces that objects wear; a material that no object wears calls for nothing.
-fn surfaces(scene: &Scene) -> impl Iterator<Item = &Surface> {
-    scene.objects.iter().map(|object| &scene.materials[object.material]).map(|Material { surface, .. }| surface)
+/// What calls for an effect, in one scene; numbers are indices into the scene's lists.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Caller {
+    /// A material that objects wear.
+    Material {
+        /// Which one.
+        material: usize,
+        /// What about it.
+        why: String,
+    },
+    /// A point light.
+    Light(usize),
+    /// Bodies in one mesh of an object that may overlap each other.
+    Parts(usize),
+    /// Two objects that may overlap.
+    Pair(usize, usize),
+    /// An object that the camera may be in.
+    Camera(usize),
 }
 
-fn any_dielectric(scene: &Scene, test: impl Fn(&Dielectric) -> bool) -> bool {
-    surfaces(scene).any(|surface| matches!(surface, Surface::Dielectric(dielectric) if test(dielectric)))
+fn of_glass(surface: &Surface) -> Option<&Dielectric> {
+    match surface {
+        Surface::Dielectric(dielectric) => Some(dielectric),
+        Surface::Opaque(_) => None,
+    }
 }
 
-fn has_light(scene: &Scene) -> bool {
-    !scene.objects.is_empty() && scene.lights.iter().any(|light| light.intensity.max_element() > 0.0)
+fn glass(surface: &Surface) -> Option<String> {
+    of_glass(surface).map(|d| format!("glass of index {}", d.ior))
+}
+
+fn rough(surface: &Surface) -> Option<String> {
+    of_glass(surface).filter(|d| d.roughness > SMOOTH).map(|d| format!("roughness {}", d.roughness))
 }
 
 /// A pane has no inside that could.
-fn absorbs(dielectric: &Dielectric) -> bool {
-    let colored = dielectric.attenuation_distance.is_finite() && dielectric.attenuation_color.min_element() < 1.0;
-    colored && !dielectric.thin_walled
+fn absorbs(surface: &Surface) -> Option<String> {
+    let dielectric = of_glass(surface)?;
+    let (color, distance) = (dielectric.attenuation_color, dielectric.attenuation_distance);
+    let colored = distance.is_finite() && color.min_element() < 1.0;
+    (colored && !dielectric.thin_walled).then(|| format!("white becomes {:?} over {distance} m", color.to_array()))
 }
 
 /// Light leaves a pane as it came, each colour in the same direction.
-fn disperses(dielectric: &Dielectric) -> bool {
-    dielectric.disperses() && !dielectric.thin_walled
+fn disperses(surface: &Surface) -> Option<String> {
+    let dielectric = of_glass(surface)?;
+    let [blue, red] = [486.1, 656.3].map(|wavelength| dielectric.index_at(wavelength));
+    let spreads = dielectric.disperses() && !dielectric.thin_walled;
+    spreads.then(|| format!("index {red:.4} for red light (656.3 nm), {blue:.4} for blue (486.1 nm)"))
+}
+
+fn thin_walled(surface: &Surface) -> Option<String> {
+    of_glass(surface).filter(|d| d.thin_walled).map(|_| "thin_walled = true".into())
+}
+
+fn opaque(surface: &Surface) -> Option<String> {
+    match surface {
+        Surface::Opaque(opaque) if opaque.emission.max_element() > 0.0 => {
+            Some("lets nothing through, and shines".into())
+        }
+        Surface::Opaque(_) => Some("lets nothing through".into()),
+        Surface::Dielectric(_) => None,
+    }
+}
+
+fn textured(surface: &Surface) -> Option<String> {
+    let is_textured = matches!(surface, Surface::Opaque(opaque) if opaque.base_color_texture.is_some());
+    is_textured.then(|| "base_color_texture".into())
+}
+
+/// A material that no object wears calls for nothing.
+fn materials<'s>(scene: &'s Scene, why: fn(&Surface) -> Option<String>) -> impl Iterator<Item = Caller> + 's {
+    let worn: BTreeSet<usize> = scene.objects.iter().map(|object| object.material).collect();
+    worn.into_iter().filter_map(move |material| {
+        why(&scene.materials[material].surface).map(|why| Caller::Material { material, why })
+    })
+}
+
+fn any_dielectric(scene: &Scene, test: impl Fn(&Dielectric) -> bool) -> bool {
+    let surfaces = scene.objects.iter().map(|object| &scene.materials[object.material].surface);
+    surfaces.filter_map(of_glass).any(test)
+}
+
+fn lights(scene: &Scene) -> impl Iterator<Item = Caller> + '_ {
+    let shines = |light: &usize| !scene.objects.is_empty() && scene.lights[*light].intensity.max_element() > 0.0;
+    (0..scene.lights.len()).filter(shines).map(Caller::Light)
 }
 
 /// Bounding boxes that meet may hold bodies that meet, and a camera in one may be inside the body.
-fn nests(scene: &Scene) -> bool {
-    let is_dielectric = |object: &&Object| matches!(scene.materials[object.material].surface, Surface::Dielectric(_));
-    if scene.objects.iter().filter(is_dielectric).any(|object| scene.meshes[object.mesh].overlaps) {
-        return true;
-    }
-    let boxes: Vec<_> = scene.objects.iter().filter(is_dielectric).map(|object| scene.bounds_of(object)).collect();
-    boxes
-        .iter()
-        .enumerate()
-        .any(|(i, a)| a.contains(scene.camera.position) || boxes[i + 1..].iter().any(|b| a.intersects(b)))
+fn overlaps(scene: &Scene) -> impl Iterator<Item = Caller> + '_ {
+    let is_glass = |number: &usize| of_glass(&scene.materials[scene.objects[*number].material].surface).is_some();
+    let bodies: Vec<usize> = (0..scene.objects.len()).filter(is_glass).collect();
+    let boxes: Vec<_> = bodies.iter().map(|&number| scene.bounds_of(&scene.objects[number])).collect();
+    let parts = |&number: &usize| scene.meshes[scene.objects[number].mesh].overlaps;
+    let parts: Vec<_> = bodies.iter().copied().filter(parts).map(Caller::Parts).collect();
+    (0..bodies.len())
+        .flat_map(move |i| {
+            let camera = boxes[i].contains(scene.camera.position).then_some(Caller::Camera(bodies[i]));
+            let pairs = (i + 1..bodies.len()).filter(|&j| boxes[i].intersects(&boxes[j]));
+            camera.into_iter().chain(pairs.map(|j| Caller::Pair(bodies[i], bodies[j]))).collect::<Vec<_>>()
+        })
+        .chain(parts)
 }
 
 impl Effect {
@@ -150,9 +251,28 @@ impl Effect {
         }
     }
 
+    /// What in `scene` may show this, found one by one.
+    pub fn callers<'s>(self, scene: &'s Scene) -> Box<dyn Iterator<Item = Caller> + 's> {
+        match self.row().calls {
+            Calls::Surface(why) => Box::new(materials(scene, why)),
+            Calls::Light => Box::new(lights(scene)),
+            Calls::Overlap => Box::new(overlaps(scene)),
+        }
+    }
+
     /// Whether something in `scene` may show this.
     pub fn called_for_by(self, scene: &Scene) -> bool {
-        (self.row().called_for)(scene)
+        self.callers(scene).next().is_some()
+    }
+
+    /// Why a scene that does not call for this does not.
+    pub fn absent(self) -> &'static str {
+        self.row().absent
+    }
+
+    /// The effect without which this changes nothing.
+    pub fn needs(self) -> Option<Self> {
+        self.row().needs
     }
 }
 

@@ -26,6 +26,9 @@ pub enum Model {
 }
 
 impl Model {
+    /// Every model, the simplest first.
+    pub const ALL: [Self; 4] = [Self::Single, Self::Double, Self::Tree, Self::Path];
+
     /// The name on the command line and in the stats.
     pub fn name(self) -> &'static str {
         match self {
@@ -195,7 +198,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = range::samples)]
     pub samples: Option<u32>,
 
-    /// Longest chain of interfaces; model single sees one [default: 32; double: 16; tree with --tolerance: 1024]
+    /// Longest chain of interfaces; model single sees one [default: 32; tree with --tolerance: 1024]
     #[arg(long, value_name = "N", value_parser = range::max_depth)]
     pub max_depth: Option<u32>,
 

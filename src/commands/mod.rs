@@ -1,6 +1,7 @@
 //! What the program offers, one file a command.
 
 mod devices;
+mod explain;
 mod numerics;
 mod render;
 
@@ -31,6 +32,8 @@ struct Cli {
 enum Command {
     /// Renders one image, off screen
     Render(Box<render::RenderCommand>),
+    /// Tells which effects a scene calls for and which not, and what each model makes of them
+    Explain(explain::ExplainCommand),
     /// Holds the shaders' optics functions on a device against 64-bit arithmetic
     Numerics(numerics::NumericsCommand),
     /// Lists the Vulkan devices and what each can do
@@ -86,6 +89,7 @@ pub fn main() -> ExitCode {
     };
     let result = match cli.command {
         Command::Render(command) => command.run(cli.talk),
+        Command::Explain(command) => command.run(),
         Command::Numerics(command) => command.run(cli.talk),
         Command::Devices(command) => command.run(),
     };

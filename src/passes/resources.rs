@@ -29,6 +29,7 @@ const ENVIRONMENT_IMAGE: u32 = 64;
 /// The ids of the same names in `shaders/path.glsl`.
 const SAMPLE_LIGHTS: u32 = 66;
 const SAMPLE_SURFACES: u32 = 67;
+const BRANCHES: u32 = 68;
 
 /// The id of `FOOTPRINTS` in `shaders/footprint.glsl`.
 const FOOTPRINTS: u32 = 65;
@@ -192,6 +193,7 @@ impl Resources {
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)
                 .with(FOOTPRINTS, footprints)
+                .with(BRANCHES, !(opaque && Effect::Opaque.called_for_by(scene)))
                 .with(SAMPLE_LIGHTS, plan.estimator != Estimator::Surfaces)
                 .with(SAMPLE_SURFACES, plan.estimator != Estimator::Lights),
             metres_per_unit: 1.0 / view.units_per_metre,
@@ -337,6 +339,7 @@ mod tests {
         let path = include_str!("../../shaders/path.glsl");
         assert!(path.contains(&format!("(constant_id = {SAMPLE_LIGHTS}) const bool SAMPLE_LIGHTS")));
         assert!(path.contains(&format!("(constant_id = {SAMPLE_SURFACES}) const bool SAMPLE_SURFACES")));
+        assert!(path.contains(&format!("(constant_id = {BRANCHES}) const bool BRANCHES")));
         let trace = include_str!("../../shaders/trace_software.glsl");
         assert!(trace.contains(&format!("const int TRACE_STACK = {TRACE_STACK};")));
     }

@@ -137,6 +137,7 @@ impl Scene {
         let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
         let Assembly { meshes, objects, mut materials, textures, mut warnings, .. } = assembly;
         let textures = textures.all;
+        warnings.splice(0..0, faults_of_meshes(&objects, &meshes, &materials));
         warn_of_missing_uvs(&objects, &meshes, &materials, &textures, &mut warnings);
         for material in &mut materials {
             if let Surface::Dielectric(dielectric) = &mut material.surface {
@@ -172,6 +173,30 @@ impl Scene {
         let bounds = self.objects.iter().fold(Bounds::EMPTY, |all, object| all.union(self.bounds_of(object)));
         (!bounds.is_empty()).then_some(bounds)
     }
+}
+
+/// What is wrong with meshes, as far as it shows on what they are: only a medium wants a closed surface.
+fn faults_of_meshes(objects: &[Object], meshes: &[Mesh], materials: &[Material]) -> Vec<String> {
+    let mut bounds_medium = vec![false; meshes.len()];
+    for object in objects {
+        let surface = &materials[object.material].surface;
+        bounds_medium[object.mesh] |= matches!(surface, Surface::Dielectric(glass) if !glass.thin_walled);
+    }
+    let mut warnings = Vec::new();
+    for (mesh, bounds_medium) in meshes.iter().zip(bounds_medium) {
+        let open_edges = if bounds_medium { mesh.faults.open_edges } else { 0 };
+        let faults = MeshFaults { open_edges, ..mesh.faults };
+        if faults.is_empty() {
+            continue;
+        }
+        let advice = match bounds_medium && !faults.is_closed() {
+            true => "; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true",
+            false => "",
+        };
+        warnings.push(format!("{}: {faults}{advice}", mesh.name));
+    }
+    shorten(&mut warnings, 0, "meshes have faults");
+    warnings
 }
 
 /// Says which meshes wear a texture but have no coordinates for it.

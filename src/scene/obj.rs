@@ -98,18 +98,12 @@ fn parts(
         part.triangles.extend(triangles.map(|triangle| triangle.map(|vertex| vertex + offset)));
     }
     let several = raw.len() > 1;
-    let before = warnings.len();
     let mut parts = Vec::new();
     let mut lost = 0;
     for (mut part, material) in raw {
         part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
         match Mesh::new(part) {
-            Ok(mesh) => {
-                if !mesh.faults.is_empty() {
-                    warnings.push(format!("{}: {}", mesh.name, mesh.faults));
-                }
-                parts.push(Part { mesh, material });
-            }
+            Ok(mesh) => parts.push(Part { mesh, material }),
             Err(Refusal::NoTriangles { degenerate }) => lost += degenerate,
             Err(refusal) => {
                 let (line, message) = bad_number(text).unwrap_or_else(|| (0, refusal.to_string()));
@@ -117,7 +111,6 @@ fn parts(
             }
         }
     }
-    shorten(warnings, before, "parts have faults");
     if parts.is_empty() {
         return Err(Error::input(path, 0, Refusal::NoTriangles { degenerate: lost }.to_string()));
     }

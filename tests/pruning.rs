@@ -1,0 +1,257 @@
+//! A shader of which everything is compiled out that the scene does not call for makes the picture of the full one, bit for
+//! bit: on the scenes that come with the program and on generated ones.
+
+#[path = "common/mod.rs"]
+mod common;
+#[allow(dead_code, reason = "each test program uses its share")]
+#[path = "tree/shapes.rs"]
+mod shapes;
+
+use std::path::Path;
+
+use glam::{DAffine3, DVec3};
+
+use common::Validated;
+use shapes::{Part, cuboid, hollow_ball, icosphere, prism, rectangle, scene};
+use vitrum::effects::{Effect, Selection};
+use vitrum::options::{Model, RenderArgs, Size};
+use vitrum::passes::{Rendered, render};
+use vitrum::plan::Plan;
+use vitrum::scene::{
+    Dielectric, Dispersion, Environment, Opaque, Overrides, Panorama, PointLight, Scene, Surface, Surroundings, Texels,
+    Texture,
+};
+
+/// What a generated scene has beside clear glass. So few, for each makes shaders of its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Kind {
+    rough: bool,
+    absorbing: bool,
+    dispersing: bool,
+    thin_walled: bool,
+    opaque: bool,
+    textured: bool,
+    lit: bool,
+    nested: bool,
+}
+
+const PLAIN: Kind = Kind {
+    rough: false,
+    absorbing: false,
+    dispersing: false,
+    thin_walled: false,
+    opaque: false,
+    textured: false,
+    lit: false,
+    nested: false,
+};
+
+const KINDS: [Kind; 10] = [
+    PLAIN,
+    Kind { rough: true, ..PLAIN },
+    Kind { absorbing: true, ..PLAIN },
+    Kind { dispersing: true, ..PLAIN },
+    Kind { nested: true, ..PLAIN },
+    Kind { thin_walled: true, nested: true, ..PLAIN },
+    Kind { opaque: true, lit: true, ..PLAIN },
+    Kind { opaque: true, textured: true, rough: true, ..PLAIN },
+    Kind { rough: true, absorbing: true, thin_walled: true, lit: true, ..PLAIN },
+    Kind { absorbing: true, dispersing: true, nested: true, opaque: true, ..PLAIN },
+];
+
+/// Scenes of each kind.
+const SCENES: u64 = 21;
+
+struct Random(fastrand::Rng);
+
+impl Random {
+    fn number(&mut self, from: f64, to: f64) -> f64 {
+        from + (to - from) * self.0.f64()
+    }
+
+    fn one_of<T: Copy>(&mut self, choices: &[T]) -> T {
+        choices[self.0.usize(..choices.len())]
+    }
+
+    fn color(&mut self) -> DVec3 {
+        DVec3::from_array([0; 3].map(|_| self.number(0.05, 1.0)))
+    }
+
+    /// Inside of [-size, size] on each axis.
+    fn point(&mut self, size: f64) -> DVec3 {
+        DVec3::from_array([0; 3].map(|_| self.number(-size, size)))
+    }
+
+    fn glass(&mut self, kind: Kind) -> Surface {
+        // Values next to where an effect begins, too.
+        let smooth = self.one_of(&[0.0, 0.005, 0.01]);
+        let roughness = if kind.rough { self.one_of(&[smooth, 0.010_01, 0.2, 1.0]) } else { smooth };
+        let distance = if kind.absorbing { self.one_of(&[0.1, 2.0, f64::INFINITY]) } else { f64::INFINITY };
+        let color = if self.0.bool() { self.color() } else { DVec3::ONE };
+        let dispersion = if kind.dispersing { self.one_of(&[0.0, 0.01, 2.0]) } else { 0.0 };
+        Surface::Dielectric(Dielectric {
+            ior: self.one_of(&[1.0, 1.001, 1.33, 1.5, 1.5, 2.4, 0.8]),
+            roughness,
+            dispersion: if dispersion > 0.0 { Dispersion::Khr(dispersion) } else { Dispersion::None },
+            attenuation_color: color,
+            attenuation_distance: distance,
+            thin_walled: kind.thin_walled && self.0.bool(),
+            priority: self.0.i32(-1..2),
+        })
+    }
+
+    fn body(&mut self, kind: Kind) -> Part {
+        let mesh = match self.0.u32(..5) {
+            0 => hollow_ball(1, 0.2),
+            1 => cuboid(DVec3::splat(-0.6), DVec3::splat(0.6)),
+            2 => prism(1.0, 1.5),
+            3 if kind.thin_walled => rectangle(1.5, 1.5),
+            _ => icosphere(2),
+        };
+        Part::of(mesh, self.glass(kind))
+    }
+
+    fn panorama(&mut self) -> Panorama {
+        let texel = |_| [0; 3].map(|_| self.0.f32() * self.0.f32().mul_add(3.0, 0.1));
+        Panorama::new(16, 8, (0..128).map(texel).collect())
+    }
+
+    fn scene(&mut self, kind: Kind) -> Scene {
+        let mut parts = Vec::new();
+        for number in 0..self.0.u32(1..4) {
+            // Bodies stand apart, or in each other.
+            let apart = DVec3::new(3.0 * f64::from(number) - 3.0, 0.0, -1.0);
+            let place = if kind.nested { self.point(0.5) } else { apart };
+            let turn = DAffine3::from_rotation_y(self.number(0.0, 6.0)) * DAffine3::from_rotation_x(self.number(0.0, 6.0));
+            let size = DVec3::splat(self.number(0.4, 1.0));
+            parts.push(self.body(kind).placed(DAffine3::from_translation(place) * turn * DAffine3::from_scale(size)));
+        }
+        if kind.opaque {
+            let surface = Opaque {
+                base_color: self.color(),
+                base_color_texture: (kind.textured && self.0.bool()).then_some(0),
+                metallic: self.one_of(&[0.0, 1.0]),
+                roughness: self.one_of(&[0.0, 0.3, 1.0]),
+                emission: if self.0.bool() { self.color() } else { DVec3::ZERO },
+                ..Opaque::default()
+            };
+            let floor = DAffine3::from_translation(DVec3::new(0.0, -1.2, 0.0)) * DAffine3::from_rotation_x(-1.5);
+            let mut part = Part::of(rectangle(6.0, 6.0), Surface::Opaque(surface)).placed(floor);
+            part.mesh.uvs = part.mesh.positions.iter().map(|&[x, y, _]| [x, y]).collect();
+            parts.push(part);
+        }
+        let texel = |i: u32| if (i + i / 4).is_multiple_of(2) { [200, 30, 90, 255] } else { [20, 190, 40, 255] };
+        let texture = Texture {
+            path: "checker.png".into(),
+            width: 4,
+            height: 4,
+            texels: Texels::Srgb((0..16).map(texel).collect()),
+        };
+        let light = if self.0.bool() { Surroundings::Image(self.panorama()) } else { Surroundings::Color(self.color()) };
+        let mut made = scene(parts);
+        made.environment = Environment {
+            light,
+            intensity: self.number(0.5, 2.0),
+            rotation: self.number(0.0, 6.0),
+            visible: self.0.bool(),
+        };
+        made.textures.push(texture);
+        if kind.nested && self.0.u32(..4) == 0 {
+            made.camera.position = self.point(0.3);
+            made.camera.target = DVec3::new(0.1, 0.2, -3.0);
+        }
+        if kind.lit {
+            for _ in 0..self.0.u32(1..3) {
+                let intensity = if self.0.u32(..3) == 0 { DVec3::ZERO } else { 10.0 * self.color() };
+                made.lights.push(PointLight { position: self.point(3.0), intensity });
+            }
+        }
+        made
+    }
+}
+
+/// Scenes that are the same in every run, with names.
+fn generated() -> impl Iterator<Item = (String, Scene)> {
+    KINDS.into_iter().enumerate().flat_map(|(i, kind)| {
+        (0..SCENES).map(move |number| {
+            let mut random = Random(fastrand::Rng::with_seed(SCENES * i as u64 + number));
+            (format!("kind {i}, scene {number}"), random.scene(kind))
+        })
+    })
+}
+
+fn shipped() -> impl Iterator<Item = (String, Scene)> {
+    let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/scenes");
+    let files = std::fs::read_dir(folder).expect("the scenes").map(|entry| entry.expect("a scene").path());
+    files.map(|path| {
+        let scene = Scene::load(Some(&path), &Overrides::default()).expect("a scene");
+        (scene.name.clone(), scene)
+    })
+}
+
+fn picture(validated: &Validated, scene: &Scene, model: Model, effects: &str) -> Rendered {
+    let args = RenderArgs {
+        model: Some(model),
+        size: Some(Size { width: 24, height: 18 }),
+        samples: Some(2),
+        max_depth: Some(8),
+        effects: Some(effects.parse::<Selection>().expect("a selection")),
+        ..RenderArgs::default()
+    };
+    render(&validated.gpu, scene, &Plan::new(scene, &args).expect("a plan"), &mut |_| {}).expect("a picture")
+}
+
+/// Numbers of a picture that differ in a bit, but for the sign of zero.
+fn differing(one: &Rendered, other: &Rendered) -> usize {
+    let numbers = |rendered: &Rendered| -> Vec<u32> {
+        let interfaces = rendered.counts.iter().flat_map(|counts| &counts.interfaces);
+        rendered.radiance.iter().flatten().chain(interfaces).map(|number| (number + 0.0).to_bits()).collect()
+    };
+    numbers(one).into_iter().zip(numbers(other)).filter(|(a, b)| a != b).count()
+}
+
+fn agree(models: [Model; 2]) {
+    let Some(validated) = Validated::open() else { return };
+    let mut count = 0;
+    for (name, scene) in shipped().chain(generated()) {
+        for model in models {
+            let [pruned, full] = ["auto", "all"].map(|effects| picture(&validated, &scene, model, effects));
+            let differing = differing(&pruned, &full);
+            assert_eq!(differing, 0, "{name}, {}: {:?}", model.name(), Selection::default().resolve(&scene).names());
+            count += 1;
+        }
+    }
+    println!("{count} pictures of {} and {}", models[0].name(), models[1].name());
+    assert!(count > 2 * 200);
+    validated.verdict();
+}
+
+#[test]
+fn pruned_rasterised_pictures_are_those_of_the_full_shaders() {
+    agree([Model::Single, Model::Double]);
+}
+
+#[test]
+fn pruned_traced_pictures_are_those_of_the_full_shaders() {
+    agree([Model::Tree, Model::Path]);
+}
+
+/// A detector that misses an effect is caught: each effect shows in a generated scene that calls for it, in the simplest model
+/// that simulates it.
+#[test]
+fn an_effect_that_a_detector_misses_shows() {
+    let Some(validated) = Validated::open() else { return };
+    for effect in Effect::all() {
+        let model = Model::ALL.into_iter().find(|&model| effect.honoured_by(model)).expect("a model");
+        let missed = format!("auto,-{}", effect.name());
+        let shows = |(name, scene): &(String, Scene)| {
+            let [pruned, full] = [&missed, "all"].map(|effects| picture(&validated, scene, model, effects));
+            let differing = differing(&pruned, &full);
+            println!("{}, {}: {name}, {differing} numbers differ", effect.name(), model.name());
+            differing > 0
+        };
+        let calls = |(_, scene): &(String, Scene)| effect.called_for_by(scene);
+        assert!(generated().filter(calls).take(12).any(|named| shows(&named)), "{}", effect.name());
+    }
+    validated.verdict();
+}
