@@ -111,6 +111,8 @@ Boundary BoundaryOf(uint instance, bool behind, Whereabouts ray)
     Bodies before = ray.bodies;
     // What is seen from the inside was entered, also where that was missed.
     if (behind && !IsIn(before, rank)) before = Entered(before, rank);
+    // What is seen from the outside was left, unless the mesh holds it twice.
+    if (!behind && instances[instance].overlaps == 0 && IsIn(before, rank)) before = Left(before, rank);
     Bodies beyond;
     if (behind) beyond = Left(before, rank); else beyond = Entered(before, rank);
     return Boundary(Whereabouts(MediumOf(before), before), Whereabouts(MediumOf(beyond), beyond));

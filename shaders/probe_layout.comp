@@ -54,6 +54,7 @@ void main()
     Put(instances[1].smoothNormals);
     Put(instances[1].number);
     Put(instances[1].rank);
+    Put(instances[1].overlaps);
     Put(materials[1].absorption);
     Put(materials[1].refractionIndex);
     Put(materials[1].baseColor);

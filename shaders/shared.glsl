@@ -42,7 +42,7 @@ struct Instance {
     uint smoothNormals;        // 0: normals of the faces
     uint number;               // of the object in the scene file, from 1
     uint rank;                 // where bodies overlap the highest one is there; 0: no body
-    uint padding;
+    uint overlaps;             // 1: its mesh may hold bodies that overlap
 };
 
 const uint KIND_DIELECTRIC = 0;

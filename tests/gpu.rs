@@ -91,7 +91,7 @@ impl Records {
                 smooth_normals: n.next() as u32,
                 number: n.next() as u32,
                 rank: n.next() as u32,
-                padding: 0,
+                overlaps: n.next() as u32,
             },
             material: MaterialRecord {
                 absorption: n.vector(),

@@ -84,7 +84,7 @@ pub struct InstanceRecord {
     pub smooth_normals: u32,
     pub number: u32,
     pub rank: u32,
-    pub padding: u32,
+    pub overlaps: u32,
 }
 
 /// `Material`: a surface and what is behind it.

@@ -87,7 +87,7 @@ impl Geometry {
                 smooth_normals: u32::from(object.smooth && !mesh.normals.is_empty()),
                 number: object.number as u32 + 1,
                 rank: ranks[number],
-                padding: 0,
+                overlaps: mesh.overlaps.into(),
             });
             if trace == Some(Trace::Hardware) {
                 all.placed.push(PlacedMesh { mesh: object.mesh, object_to_world });
