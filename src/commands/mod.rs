@@ -1,5 +1,6 @@
 //! What the program offers, one file a command.
 
+mod compare;
 mod devices;
 mod numerics;
 mod render;
@@ -31,6 +32,8 @@ struct Cli {
 enum Command {
     /// Renders one image, off screen
     Render(Box<render::RenderCommand>),
+    /// Says how far an image is from a reference
+    Compare(compare::CompareCommand),
     /// Holds the shaders' optics functions on a device against 64-bit arithmetic
     Numerics(numerics::NumericsCommand),
     /// Lists the Vulkan devices and what each can do
@@ -86,6 +89,7 @@ pub fn main() -> ExitCode {
     };
     let result = match cli.command {
         Command::Render(command) => command.run(cli.talk),
+        Command::Compare(command) => command.run(cli.talk),
         Command::Numerics(command) => command.run(cli.talk),
         Command::Devices(command) => command.run(),
     };

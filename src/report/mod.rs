@@ -1,9 +1,11 @@
-//! What is told about a render, and about a device's arithmetic.
+//! What is told about a render, about two images, and about a device's arithmetic.
 
+mod compare;
 mod numerics;
 mod numerics_page;
 mod plots;
 mod stats;
 
+pub use compare::{CompareReport, MetricValues};
 pub use numerics::{NumericsFiles, NumericsReport};
 pub use stats::{BuildTimes, DeviceStats, PassStats, Run, Stats};
