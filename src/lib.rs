@@ -3,18 +3,20 @@
 //! The data flows through the modules in this order:
 //!
 //! ```text
-//! scene file -> scene -> effects needed -> plan -> GPU resources -> passes -> image -> report
+//! scene file -> scene -> effects needed -> plan -> GPU resources -> passes -> image -> metrics -> report
 //! ```
 //!
 //! [`scene`] is plain data without a Vulkan type, [`effects`] the table of what can be simulated, [`plan`] what one
 //! render does, [`gpu`] the only room with `unsafe`, [`passes`] the frame, [`image`] pixels and their files,
-//! [`report`] what is told about a render, [`commands`] what the binary offers. [`optics`] states in 64-bit
-//! arithmetic what `shaders/` computes in 32, and [`numerics`] holds one against the other on a device.
+//! [`compare`] metrics between two images, [`report`] what is told about a render, [`commands`] what the binary offers.
+//! [`optics`] states in 64-bit arithmetic what `shaders/` computes in 32, and [`numerics`] holds one against the other
+//! on a device.
 
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
 pub mod commands;
+pub mod compare;
 pub mod effects;
 pub mod error;
 #[allow(unsafe_code)]

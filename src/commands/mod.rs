@@ -1,5 +1,6 @@
 //! What the program offers, one file a command.
 
+mod compare;
 mod devices;
 mod explain;
 mod numerics;
@@ -34,6 +35,8 @@ enum Command {
     Render(Box<render::RenderCommand>),
     /// Tells which effects a scene calls for and which not, and what each model makes of them
     Explain(explain::ExplainCommand),
+    /// Says how far an image is from a reference
+    Compare(compare::CompareCommand),
     /// Holds the shaders' optics functions on a device against 64-bit arithmetic
     Numerics(numerics::NumericsCommand),
     /// Lists the Vulkan devices and what each can do
@@ -90,6 +93,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Render(command) => command.run(cli.talk),
         Command::Explain(command) => command.run(),
+        Command::Compare(command) => command.run(cli.talk),
         Command::Numerics(command) => command.run(cli.talk),
         Command::Devices(command) => command.run(),
     };

@@ -1,11 +1,13 @@
-//! What is told about a render, and about a device's arithmetic.
+//! What is told about a render, about two images, and about a device's arithmetic.
 
+mod compare;
 mod explain;
 mod numerics;
 mod numerics_page;
 mod plots;
 mod stats;
 
+pub use compare::{CompareReport, MetricValues};
 pub use explain::Explanation;
 pub use numerics::{NumericsFiles, NumericsReport};
 pub use stats::{BuildTimes, DeviceStats, PassStats, Run, Stats};

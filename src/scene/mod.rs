@@ -29,6 +29,7 @@ use glam::{DAffine3, DVec3};
 pub use bounds::Bounds;
 pub use camera::Camera;
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
+pub(crate) use files::Files;
 pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
 pub use mesh::{Mesh, MeshFaults, RawMesh, Refusal};
 pub use texture::{Texels, Texture};
@@ -37,7 +38,6 @@ use crate::options::RenderArgs;
 use crate::{Error, Result};
 use assembly::{Assembly, Placement, Wear};
 use file::{EnvironmentTable, Light, SceneFile};
-use files::Files;
 use obj::shorten;
 
 /// Everything that a picture shows.
