@@ -17,6 +17,7 @@
 
 pub mod commands;
 pub mod compare;
+pub mod cost;
 pub mod effects;
 pub mod error;
 #[allow(unsafe_code)]

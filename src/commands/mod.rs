@@ -1,6 +1,7 @@
 //! What the program offers, one file a command.
 
 mod compare;
+mod cost;
 mod devices;
 mod explain;
 mod numerics;
@@ -35,6 +36,8 @@ enum Command {
     Render(Box<render::RenderCommand>),
     /// Tells which effects a scene calls for and which not, and what each model makes of them
     Explain(explain::ExplainCommand),
+    /// Measures what accuracy costs in time, for one scene
+    Cost(Box<cost::CostCommand>),
     /// Says how far an image is from a reference
     Compare(compare::CompareCommand),
     /// Holds the shaders' optics functions on a device against 64-bit arithmetic
@@ -93,6 +96,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Render(command) => command.run(cli.talk),
         Command::Explain(command) => command.run(),
+        Command::Cost(command) => command.run(cli.talk),
         Command::Compare(command) => command.run(cli.talk),
         Command::Numerics(command) => command.run(cli.talk),
         Command::Devices(command) => command.run(),

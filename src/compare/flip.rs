@@ -9,7 +9,7 @@ use std::sync::LazyLock;
 
 use glam::{DMat3, DVec3, Vec3};
 
-use super::is_finite;
+use super::{is_finite, magma};
 use crate::parallel;
 
 /// A monitor of 3840 pixels and 0.7 m across, seen from 0.7 m: the default of NVIDIA's tool.
@@ -56,6 +56,13 @@ pub struct Exposures {
     pub stop: f64,
     /// How many.
     pub count: u32,
+}
+
+impl Flip {
+    /// The map in the colours of magma, as sRGB: black where there is no error, pale yellow where it is 1.
+    pub fn colors(&self) -> Vec<[u8; 3]> {
+        self.map.iter().map(|&error| magma::color(error)).collect()
+    }
 }
 
 /// LDR-FLIP. Pixels are display values, decoded to linear; what is outside of 0 to 1 is clamped.

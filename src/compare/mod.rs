@@ -90,7 +90,7 @@ impl Comparison {
 
     /// FLIP in the colours of magma, as sRGB: black where there is no error, pale yellow where it is 1.
     pub fn error_map(&self) -> Vec<[u8; 3]> {
-        self.flip.map.iter().map(|&error| magma::color(error)).collect()
+        self.flip.colors()
     }
 }
 

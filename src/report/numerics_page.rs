@@ -67,6 +67,6 @@ pub(super) fn html(report: &NumericsReport, svg: Option<&str>) -> String {
     text + "</table>\n</body>\n</html>\n"
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }

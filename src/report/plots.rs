@@ -91,16 +91,16 @@ static PANELS: [Panel; 10] = [
 const PANEL: (u32, u32) = (640, 400);
 const COLUMNS: usize = 2;
 /// The palette of Okabe and Ito (2008), which colour-blind readers can tell apart.
-const COLORS: [RGBColor; 4] =
+pub(super) const COLORS: [RGBColor; 4] =
     [RGBColor(0, 114, 178), RGBColor(213, 94, 0), RGBColor(0, 158, 115), RGBColor(204, 121, 167)];
-const INK: RGBColor = RGBColor(40, 40, 40);
-const GRID: RGBColor = RGBColor(225, 225, 225);
+pub(super) const INK: RGBColor = RGBColor(40, 40, 40);
+pub(super) const GRID: RGBColor = RGBColor(225, 225, 225);
 /// A plot shows no more powers of ten than this.
 const MOST_DECADES: f64 = 14.0;
 /// Pixels left of a plot.
 const LEFT: i32 = 86;
 
-type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
+pub(super) type Drawn<'a> = Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>;
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 
 /// The worst errors of a measure over all regions, by degrees of incidence.
@@ -272,10 +272,10 @@ fn draw_panel<'a>(area: &Area<'a>, panel: &Panel, curves: &[Curve]) -> Drawn<'a>
 }
 
 /// An axis with ticks where they are wanted.
-struct Axis {
-    from: f64,
-    to: f64,
-    ticks: Vec<f64>,
+pub(super) struct Axis {
+    pub(super) from: f64,
+    pub(super) to: f64,
+    pub(super) ticks: Vec<f64>,
 }
 
 impl Ranged for Axis {
@@ -295,7 +295,7 @@ impl Ranged for Axis {
     }
 }
 
-fn power_of_ten(power: i32) -> String {
+pub(super) fn power_of_ten(power: i32) -> String {
     let raised = |digit| match digit {
         '-' => '\u{207b}',
         '1' => '\u{b9}',

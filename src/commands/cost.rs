@@ -1,0 +1,147 @@
+//! `vitrum cost`: error against time for the models, settings and effects that apply to a scene.
+
+use std::path::PathBuf;
+use std::time::Duration;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+
+use super::{Talk, devices, print};
+use crate::cost::{Measurement, make_folder};
+use crate::effects::Selection;
+use crate::gpu::{Gpu, Instance};
+use crate::options::{RenderArgs, Size, Trace, range};
+use crate::report::CostReport;
+use crate::scene::{Overrides, Scene};
+use crate::{Error, Result};
+
+/// The size of the pictures, where the user has no wish: errors hardly depend on it, and time is pixels.
+const SIZE: Size = Size { width: 320, height: 240 };
+
+/// Seconds for the reference, where the user has no wish.
+const REFERENCE_SECONDS: f64 = 60.0;
+
+/// Options of `vitrum cost`.
+#[derive(Debug, Args)]
+#[command(allow_negative_numbers = true)]
+pub(super) struct CostCommand {
+    /// A .toml scene, or a bare .obj shown as clear glass; none: the built-in teapot and cups
+    scene: Option<PathBuf>,
+
+    /// Folder for cost.json, index.html, the pictures, and the reference, which a later run goes on with
+    #[arg(short, long, value_name = "DIR")]
+    output: Option<PathBuf>,
+
+    /// Size of the pictures [default: 320x240]
+    #[arg(long, value_name = "WxH")]
+    size: Option<Size>,
+
+    /// Time for the reference, less if it is precise enough before [default: 60]
+    #[arg(long, value_name = "SECONDS", value_parser = range::positive)]
+    reference_time: Option<f64>,
+
+    /// Effects simulated, as for render [default: auto]
+    #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
+    effects: Option<Selection>,
+
+    /// Longest chain of interfaces [default: 32; of the reference: 1024]
+    #[arg(long, value_name = "N", value_parser = range::max_depth)]
+    max_depth: Option<u32>,
+
+    /// Seed of everything random [default: 0]
+    #[arg(long, value_name = "N", value_parser = range::seed)]
+    seed: Option<u64>,
+
+    /// Index of refraction of every dielectric
+    #[arg(long, value_name = "X", value_parser = range::ior)]
+    ior: Option<f64>,
+
+    /// Roughness of every dielectric, 0 to 1
+    #[arg(long, value_name = "X", value_parser = range::unit)]
+    roughness: Option<f64>,
+
+    /// Environment image in place of the scene's
+    #[arg(long, value_name = "FILE")]
+    env: Option<PathBuf>,
+
+    /// Vulkan device: part of its name, its index, or "list" [default: the best one]
+    #[arg(long, value_name = "NAME|INDEX|list", env = "VITRUM_DEVICE")]
+    device: Option<String>,
+
+    /// How rays are traced [default: hardware on a GPU with ray queries, else software]
+    #[arg(long, value_name = "HOW")]
+    trace: Option<Trace>,
+}
+
+impl CostCommand {
+    pub(super) fn run(self, talk: Talk) -> Result<()> {
+        if self.device.as_deref() == Some("list") {
+            return print(&devices::table(&Instance::new(/* validation: */ false)?.devices()?));
+        }
+        let folder =
+            self.output.as_deref().ok_or_else(|| Error::Usage("cost needs a folder for its report: -o DIR".into()))?;
+        let overrides = Overrides { ior: self.ior, roughness: self.roughness, environment: self.env.clone() };
+        let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
+        let size = self.size.unwrap_or(SIZE);
+        scene.frame(f64::from(size.width) / f64::from(size.height));
+        let options = RenderArgs {
+            size: Some(size),
+            seed: self.seed.or(scene.render.seed),
+            max_depth: self.max_depth.or(scene.render.max_depth),
+            effects: self.effects.clone().or(scene.render.effects.clone()),
+            trace: self.trace.or(scene.render.trace),
+            ..RenderArgs::default()
+        };
+        let instance = Instance::new(/* validation: */ false)?;
+        let gpu = Gpu::open(&instance, instance.choose(self.device.as_deref())?)?;
+        make_folder(folder)?;
+        for warning in &scene.warnings {
+            talk.note(&format!("warning: {warning}"));
+        }
+
+        let bar = if talk.shows_progress() { ProgressBar::new(1000) } else { ProgressBar::hidden() };
+        if let Ok(style) = ProgressStyle::with_template("{bar:40} {percent:>3} % {msg}") {
+            bar.set_style(style);
+        }
+        let measurement = Measurement {
+            gpu: &gpu,
+            scene: &scene,
+            options,
+            folder: folder.into(),
+            reference_depth: self.max_depth,
+            half: Duration::from_secs_f64(self.reference_time.unwrap_or(REFERENCE_SECONDS) / 2.0),
+        };
+        let cost = measurement.run(&mut |what, share| {
+            bar.set_position((share * 1000.0) as u64);
+            bar.set_message(what.to_owned());
+        })?;
+        bar.finish_and_clear();
+        let report = CostReport::new(gpu.info(), &scene, size, self.command(), &cost);
+        report.write(folder, &cost)?;
+        print(&report.table())?;
+        talk.note(&format!("{}: {:.0} s", folder.join("index.html").display(), cost.taken.as_secs_f64()));
+        Ok(())
+    }
+
+    /// The command line that repeats this.
+    fn command(&self) -> String {
+        let quoted = |text: String| if text.contains([' ', '"', '\'']) { format!("{text:?}") } else { text };
+        let path = |path: &PathBuf| quoted(path.display().to_string());
+        let options = [
+            ("", self.scene.as_ref().map(path)),
+            ("-o ", self.output.as_ref().map(path)),
+            ("--size ", self.size.map(|size| size.to_string())),
+            ("--reference-time ", self.reference_time.map(|x| x.to_string())),
+            ("--effects ", self.effects.as_ref().map(Selection::to_string)),
+            ("--max-depth ", self.max_depth.map(|x| x.to_string())),
+            ("--seed ", self.seed.map(|x| x.to_string())),
+            ("--ior ", self.ior.map(|x| x.to_string())),
+            ("--roughness ", self.roughness.map(|x| x.to_string())),
+            ("--env ", self.env.as_ref().map(path)),
+            ("--device ", self.device.clone().map(quoted)),
+            ("--trace ", self.trace.map(|trace| trace.name().to_owned())),
+        ];
+        let given = options.into_iter().filter_map(|(name, value)| Some(format!(" {name}{}", value?)));
+        format!("vitrum cost{}", given.collect::<String>())
+    }
+}

@@ -1,0 +1,282 @@
+//! What accuracy costs in time: models and settings against a reference, effects against their absence. In flow a scene
+//! and a device, out flow errors and times.
+//!
+//! The reference is the mean of two independent pictures of `path`. The square of an error is told by the product of the
+//! differences from one and from the other: their noise, independent and of mean 0, drops out.
+
+mod error;
+mod settings;
+
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
+
+pub use error::Estimate;
+pub use settings::{Setting, settings};
+
+use crate::compare::flip;
+use crate::effects::{Effect, Effects};
+use crate::gpu::Gpu;
+use crate::options::{Model, RenderArgs};
+use crate::passes::{self, Rendered};
+use crate::plan::Plan;
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// Errors that are looked for among the settings.
+pub const TARGETS: [f64; 4] = [1e-1, 1e-2, 1e-3, 1e-4];
+
+/// The mean of standard error / (value + 0.1) of each half of the reference below which it is good enough.
+const REFERENCE_TOLERANCE: f64 = 5e-3;
+
+/// Runs of a setting, of which the median is told, while they take less than this in all.
+const MOST_RUNS: usize = 3;
+const LONG: Duration = Duration::from_secs(3);
+
+/// A setting that would take longer, judged by the one before it, is left out.
+const TOO_LONG_MS: f64 = 20e3;
+
+/// The longest chain of interfaces of the reference, where the user has no wish: what is trapped for longer is faint.
+const REFERENCE_DEPTH: u32 = 1024;
+
+/// Seeds of the halves of the reference, beside that of the pictures.
+const REFERENCE_SEEDS: [u64; 2] = [0x5eed_0001, 0x5eed_0002];
+
+/// What two independent pictures of `path` say.
+pub struct Reference {
+    /// The pictures.
+    pub halves: [Vec<[f32; 3]>; 2],
+    /// Their mean.
+    pub mean: Vec<[f32; 3]>,
+    /// The first as a screen shows it.
+    pub display: Vec<[u8; 4]>,
+    /// Samples per pixel, of both together.
+    pub samples: u32,
+    /// Of these, those that were found in files.
+    pub resumed: u32,
+    /// relMSE of the mean that is noise.
+    pub noise: f64,
+}
+
+/// A setting, measured.
+pub struct Measured {
+    /// What was asked for.
+    pub setting: Setting,
+    /// What that amounts to.
+    pub plan: Plan,
+    /// Milliseconds of each run: on the device, or where that has no clock on the host.
+    pub times: Vec<f64>,
+    /// relMSE against the reference.
+    pub relmse: Estimate,
+    /// FLIP against the mean of the reference.
+    pub flip: flip::Flip,
+    /// The last run.
+    pub rendered: Rendered,
+    /// Whether nothing else is both faster and closer.
+    pub is_best: bool,
+}
+
+/// The same frame with an effect and without it.
+pub struct EffectCost {
+    /// The effect.
+    pub effect: Effect,
+    /// The model that was asked.
+    pub model: Model,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// With it.
+    pub with: Share,
+    /// Without it, and what needs it.
+    pub without: Share,
+}
+
+/// Time and error of a frame.
+#[derive(Clone, Copy, Debug)]
+pub struct Share {
+    /// Median of the runs, in milliseconds.
+    pub ms: f64,
+    /// Milliseconds until the pipelines had run once.
+    pub pipelines_ms: f64,
+    /// relMSE against the reference.
+    pub relmse: Estimate,
+}
+
+/// Everything that is measured of a scene.
+pub struct Cost {
+    /// What it is held against.
+    pub reference: Reference,
+    /// Each model and setting.
+    pub entries: Vec<Measured>,
+    /// Each effect that the scene calls for.
+    pub effects: Vec<EffectCost>,
+    /// The time that all of it took.
+    pub taken: Duration,
+}
+
+/// How a cost is measured.
+pub struct Measurement<'a> {
+    /// The device.
+    pub gpu: &'a Gpu,
+    /// The scene, its camera framed.
+    pub scene: &'a Scene,
+    /// Size, seed, effects, tracer; what else there is, is set by the settings.
+    pub options: RenderArgs,
+    /// Where the halves of the reference are kept.
+    pub folder: PathBuf,
+    /// The longest chain of interfaces of the reference.
+    pub reference_depth: Option<u32>,
+    /// How long each half of the reference may be worked at.
+    pub half: Duration,
+}
+
+impl Measurement<'_> {
+    /// Measures. `progress` hears what comes next, and how much is done, from 0 to 1.
+    pub fn run(&self, progress: &mut dyn FnMut(&str, f64)) -> Result<Cost> {
+        let start = Instant::now();
+        let reference = self.reference(progress)?;
+        let settings = settings();
+        let wanted = self.options.effects.clone().unwrap_or_default().resolve(self.scene);
+        let steps = (settings.len() + wanted.iter().count()) as f64;
+        let done = |step: usize| 0.4 + 0.6 * step as f64 / steps;
+        let mut entries: Vec<Measured> = Vec::new();
+        for (step, setting) in settings.iter().enumerate() {
+            progress(&setting.label(), done(step));
+            let before = entries.iter().rev().find(|entry| entry.setting.model == setting.model);
+            if before.is_none_or(|before| before.predicted(setting) < TOO_LONG_MS) {
+                entries.push(self.measure(setting, &reference)?);
+            }
+        }
+        mark_best(&mut entries);
+        let mut effects = Vec::new();
+        for (step, effect) in wanted.iter().enumerate() {
+            progress(effect.name(), done(settings.len() + step));
+            effects.extend(self.effect(effect, wanted, &reference)?);
+        }
+        Ok(Cost { reference, entries, effects, taken: start.elapsed() })
+    }
+
+    fn reference(&self, progress: &mut dyn FnMut(&str, f64)) -> Result<Reference> {
+        let mut samples = 0;
+        let mut resumed = 0;
+        let mut display = Vec::new();
+        let mut halves = Vec::new();
+        for (number, seed) in (0..).zip(REFERENCE_SEEDS) {
+            progress("reference", 0.2 * f64::from(number));
+            let file = self.folder.join(format!("reference-{}.state", number + 1));
+            let args = RenderArgs {
+                model: Some(Model::Path),
+                seed: Some(self.options.seed.unwrap_or(0) ^ seed),
+                max_depth: self.reference_depth.or(Some(REFERENCE_DEPTH)),
+                tolerance: Some(REFERENCE_TOLERANCE),
+                time_budget: Some(self.half.as_secs_f64()),
+                checkpoint: Some(file.clone()),
+                ..self.options.clone()
+            };
+            let plan = Plan::new(self.scene, &args)?;
+            let half = match passes::render(self.gpu, self.scene, &plan, &mut |_| {}) {
+                // It holds another scene's, or is damaged: there is no loss in making it again.
+                Err(Error::Input { path, .. }) if path == file => {
+                    std::fs::remove_file(&file).map_err(|source| Error::file(&file, "remove", source))?;
+                    passes::render(self.gpu, self.scene, &plan, &mut |_| {})?
+                }
+                result => result?,
+            };
+            samples += half.samples;
+            resumed += half.resumed;
+            if display.is_empty() {
+                display = half.display;
+            }
+            halves.push(half.radiance);
+        }
+        let [first, second] = [halves.swap_remove(0), halves.swap_remove(0)];
+        let mean = error::mean(&first, &second);
+        let noise = error::noise(&first, &second, &mean);
+        Ok(Reference { halves: [first, second], mean, display, samples, resumed, noise })
+    }
+
+    fn measure(&self, setting: &Setting, reference: &Reference) -> Result<Measured> {
+        let plan = Plan::new(self.scene, &setting.on(&self.options))?;
+        let (times, rendered) = self.timed(&plan)?;
+        let relmse = reference.relmse(&rendered.radiance);
+        let width = plan.size.width as usize;
+        let flip = flip::hdr(width, &rendered.radiance, &reference.mean);
+        Ok(Measured { setting: setting.clone(), plan, times, relmse, flip, rendered, is_best: false })
+    }
+
+    /// Renders until the time of it is known.
+    fn timed(&self, plan: &Plan) -> Result<(Vec<f64>, Rendered)> {
+        let start = Instant::now();
+        let mut times = Vec::new();
+        loop {
+            let begun = Instant::now();
+            let rendered = passes::render(self.gpu, self.scene, plan, &mut |_| {})?;
+            let device: Option<f64> = rendered.passes.iter().map(|pass| pass.gpu_ms).sum();
+            times.push(device.unwrap_or(begun.elapsed().as_secs_f64() * 1e3));
+            if times.len() == MOST_RUNS || start.elapsed() > LONG {
+                return Ok((times, rendered));
+            }
+        }
+    }
+
+    /// What `effect` costs and is worth, in the first model that simulates it as it is.
+    fn effect(&self, effect: Effect, wanted: Effects, reference: &Reference) -> Result<Option<EffectCost>> {
+        let exact = |model: &Model| effect.honoured_by(*model) && !effect.approximated_by(*model, self.scene);
+        let simulates_all = |model: &Model| wanted.iter().all(|e| e.honoured_by(*model));
+        let Some(model) = [Model::Tree, Model::Path].into_iter().filter(simulates_all).find(exact) else {
+            return Ok(None);
+        };
+        let setting = Setting::of(model, settings::samples_of_effects(model));
+        let share = |effects: &str| -> Result<Share> {
+            let effects = Some(effects.parse().map_err(Error::Usage)?);
+            let plan = Plan::new(self.scene, &RenderArgs { effects, ..setting.on(&self.options) })?;
+            let (times, rendered) = self.timed(&plan)?;
+            Ok(Share {
+                ms: median(&times),
+                pipelines_ms: rendered.pipelines.as_secs_f64() * 1e3,
+                relmse: reference.relmse(&rendered.radiance),
+            })
+        };
+        let names = wanted.names().join(",");
+        let with = share(&names)?;
+        let without = share(&format!("{names},-{}", effect.name()))?;
+        Ok(Some(EffectCost { effect, model, samples: setting.samples, with, without }))
+    }
+}
+
+impl Reference {
+    /// How far `picture` is from the truth.
+    pub fn relmse(&self, picture: &[[f32; 3]]) -> Estimate {
+        let [first, second] = &self.halves;
+        error::relmse(picture, first, second, &self.mean)
+    }
+}
+
+impl Measured {
+    /// Median time of the runs, in milliseconds.
+    pub fn ms(&self) -> f64 {
+        median(&self.times)
+    }
+
+    /// What `other`, of the same model, may take.
+    fn predicted(&self, other: &Setting) -> f64 {
+        self.ms() * f64::from(other.samples) / f64::from(self.setting.samples)
+    }
+}
+
+/// Marks what nothing else beats in both time and error. An error that is told as 0 or less counts as its own uncertainty.
+fn mark_best(entries: &mut [Measured]) {
+    let points: Vec<_> = entries.iter().map(|entry| (entry.ms(), entry.relmse.at_least())).collect();
+    for (entry, &(ms, error)) in entries.iter_mut().zip(&points) {
+        entry.is_best = !points.iter().any(|&(t, e)| t <= ms && e <= error && (t < ms || e < error));
+    }
+}
+
+fn median(values: &[f64]) -> f64 {
+    let mut sorted = values.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+}
+
+/// The folder of a report, made if it is not there.
+pub fn make_folder(folder: &Path) -> Result<()> {
+    std::fs::create_dir_all(folder).map_err(|source| Error::file(folder, "create", source))
+}
