@@ -7,9 +7,10 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
-use crate::cost::{Measurement, make_folder};
+use crate::cost::Measurement;
 use crate::effects::Selection;
 use crate::gpu::{Gpu, Instance};
+use crate::image::{check_folder, make_folder};
 use crate::options::{RenderArgs, Size, Trace, range};
 use crate::report::CostReport;
 use crate::scene::{Overrides, Scene};
@@ -20,6 +21,9 @@ const SIZE: Size = Size { width: 320, height: 240 };
 
 /// Seconds for the reference, where the user has no wish.
 const REFERENCE_SECONDS: f64 = 60.0;
+
+/// What is said of an output that is a file.
+const NO_FOLDER: &str = "is a file; the report is a folder: name one";
 
 /// Options of `vitrum cost`.
 #[derive(Debug, Args)]
@@ -80,6 +84,7 @@ impl CostCommand {
         }
         let folder =
             self.output.as_deref().ok_or_else(|| Error::Usage("cost needs a folder for its report: -o DIR".into()))?;
+        check_folder(folder, NO_FOLDER)?;
         let overrides = Overrides { ior: self.ior, roughness: self.roughness, environment: self.env.clone() };
         let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
         let size = self.size.unwrap_or(SIZE);
@@ -94,7 +99,7 @@ impl CostCommand {
         };
         let instance = Instance::new(/* validation: */ false)?;
         let gpu = Gpu::open(&instance, instance.choose(self.device.as_deref())?)?;
-        make_folder(folder)?;
+        make_folder(folder, NO_FOLDER)?;
         for warning in &scene.warnings {
             talk.note(&format!("warning: {warning}"));
         }

@@ -143,6 +143,20 @@ fn behind_links(path: &Path) -> io::Result<PathBuf> {
     Err(io::Error::other("too many symbolic links"))
 }
 
+/// Whether `folder` is one or can become one; `otherwise` says what to do where it is a file. Nothing is made.
+pub fn check_folder(folder: &Path, otherwise: &'static str) -> Result<()> {
+    match folder.ancestors().find(|place| place.exists()) {
+        Some(place) if !place.is_dir() => Err(Error::input(place, 0, otherwise)),
+        _ => Ok(()),
+    }
+}
+
+/// Makes `folder`, unless it is there.
+pub fn make_folder(folder: &Path, otherwise: &'static str) -> Result<()> {
+    check_folder(folder, otherwise)?;
+    std::fs::create_dir_all(folder).map_err(|source| Error::file(folder, "create", source))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -7,7 +7,7 @@ use serde::{Serialize, Serializer};
 
 use super::{DeviceStats, numerics_page, plots};
 use crate::gpu::DeviceInfo;
-use crate::image::OutputFile;
+use crate::image::{OutputFile, check_folder, make_folder};
 use crate::numerics::Function;
 use crate::numerics::suite::{Finding, RegionReport};
 use crate::{Error, Result};
@@ -26,21 +26,18 @@ pub struct NumericsFiles {
     page: OutputFile,
 }
 
+/// What is said of an output that is a file.
+const NO_FOLDER: &str = "is a file; without --inputs the output is a folder: name one";
+
 impl NumericsFiles {
     /// Whether `folder` is one or can become one. Nothing is made yet.
     pub fn check(folder: &Path) -> Result<()> {
-        match folder.ancestors().find(|place| place.exists()) {
-            Some(place) if !place.is_dir() => {
-                Err(Error::input(place, 0, "is a file; without --inputs the output is a folder: name one"))
-            }
-            _ => Ok(()),
-        }
+        check_folder(folder, NO_FOLDER)
     }
 
     /// Those in `folder`, which is made if it is not there.
     pub fn new(folder: &Path) -> Result<Self> {
-        Self::check(folder)?;
-        std::fs::create_dir_all(folder).map_err(|source| Error::file(folder, "create", source))?;
+        make_folder(folder, NO_FOLDER)?;
         let file = |name| OutputFile::new(&folder.join(name));
         Ok(Self { json: file("numerics.json")?, plots: file("numerics.svg")?, page: file("index.html")? })
     }
