@@ -112,7 +112,7 @@ const TABLE: [Row; 13] = {
         ),
         row(Nesting, "nesting", TRACED, Overlap, "no bodies of glass overlap, and the camera is in none"),
         row(ThinWalled, "thin-walled", INSIDE, Surface(thin_walled), "no glass is thin-walled"),
-        row(Opaque, "opaque", TRACED, Surface(opaque), "every object is of glass"),
+        row(Opaque, "opaque", TRACED, Surface(opaque), "no object is opaque"),
         row(Textures, "textures", TRACED, Surface(textured), "no opaque object wears an image"),
     ]
 };
@@ -145,11 +145,11 @@ fn of_glass(surface: &Surface) -> Option<&Dielectric> {
 }
 
 fn glass(surface: &Surface) -> Option<String> {
-    of_glass(surface).map(|d| format!("glass of index {}", d.ior))
+    of_glass(surface).map(|d| format!("glass of index {}", d.ior as f32))
 }
 
 fn rough(surface: &Surface) -> Option<String> {
-    of_glass(surface).filter(|d| d.roughness > SMOOTH).map(|d| format!("roughness {}", d.roughness))
+    of_glass(surface).filter(|d| d.roughness > SMOOTH).map(|d| format!("roughness {}", d.roughness as f32))
 }
 
 /// A pane has no inside that could.
@@ -157,7 +157,8 @@ fn absorbs(surface: &Surface) -> Option<String> {
     let dielectric = of_glass(surface)?;
     let (color, distance) = (dielectric.attenuation_color, dielectric.attenuation_distance);
     let colored = distance.is_finite() && color.min_element() < 1.0;
-    (colored && !dielectric.thin_walled).then(|| format!("white becomes {:?} over {distance} m", color.to_array()))
+    let [r, g, b] = color.as_vec3().to_array();
+    (colored && !dielectric.thin_walled).then(|| format!("white becomes {r}, {g}, {b} over {} m", distance as f32))
 }
 
 /// Light leaves a pane as it came, each colour in the same direction.
@@ -184,10 +185,10 @@ fn opaque(surface: &Surface) -> Option<String> {
 
 fn textured(surface: &Surface) -> Option<String> {
     let is_textured = matches!(surface, Surface::Opaque(opaque) if opaque.base_color_texture.is_some());
-    is_textured.then(|| "base_color_texture".into())
+    is_textured.then(|| "the base colour is an image".into())
 }
 
-/// A material that no object wears calls for nothing.
+/// A material that no object wears calls for nothing. Reasons tell numbers as 32 bits hold them: files of meshes do.
 fn materials<'s>(scene: &'s Scene, why: fn(&Surface) -> Option<String>) -> impl Iterator<Item = Caller> + 's {
     let worn: BTreeSet<usize> = scene.objects.iter().map(|object| object.material).collect();
     worn.into_iter().filter_map(move |material| {
@@ -390,8 +391,10 @@ impl fmt::Display for Selection {
 
 #[cfg(test)]
 mod tests {
+    use glam::DVec3;
+
     use super::*;
-    use crate::scene::{Dispersion, Glass, Opaque, Overrides};
+    use crate::scene::{Dispersion, Glass, Opaque, Overrides, PointLight};
 
     fn built_in() -> Scene {
         Scene::load(None, &Overrides::default()).expect("the built-in scene")
@@ -472,5 +475,62 @@ mod tests {
         }
         scene.objects.clear();
         assert!(calls(&scene).is_empty());
+    }
+
+    #[test]
+    fn callers_are_what_an_effect_is_called_for_by() {
+        let check = |scene: &Scene, effect: Effect, expected: &[Caller]| {
+            assert_eq!(effect.callers(scene).collect::<Vec<_>>(), expected, "{effect:?}");
+            for effect in Effect::all() {
+                assert_eq!(effect.called_for_by(scene), effect.callers(scene).next().is_some(), "{effect:?}");
+                assert!(!effect.absent().is_empty(), "{effect:?}");
+            }
+        };
+        let mut scene = built_in();
+        let glass = Caller::Material { material: 0, why: "glass of index 1.5".into() };
+        check(&scene, Effect::Reflection, &[glass]);
+        check(&scene, Effect::Nesting, &[Caller::Pair(0, 2)]);
+        // Shines, does not shine.
+        scene.lights = [1.0, 0.0].map(|x| PointLight { position: DVec3::Y, intensity: DVec3::splat(x) }).into();
+        check(&scene, Effect::DirectLight, &[Caller::Light(0)]);
+        check(&scene, Effect::Shadows, &[Caller::Light(0)]);
+        scene.objects.remove(2);
+        check(&scene, Effect::Nesting, &[]);
+        scene.meshes[1].overlaps = true;
+        check(&scene, Effect::Nesting, &[Caller::Parts(1)]);
+        scene.camera.position = scene.bounds_of(&scene.objects[0]).center();
+        check(&scene, Effect::Nesting, &[Caller::Camera(0), Caller::Parts(1)]);
+
+        let mut worn = scene.materials[0].clone();
+        worn.surface = Surface::Opaque(Opaque::default());
+        scene.materials.push(worn);
+        check(&scene, Effect::Opaque, &[]);
+        scene.objects[1].material = 1;
+        check(&scene, Effect::Opaque, &[Caller::Material { material: 1, why: "lets nothing through".into() }]);
+        check(&scene, Effect::Nesting, &[Caller::Camera(0)]);
+        scene.objects.clear();
+        assert!(Effect::all().all(|effect| effect.callers(&scene).next().is_none()));
+    }
+
+    /// Meshes' files hold 32 bits: 1.45 comes as 1.4500000476837158.
+    #[test]
+    fn callers_tell_short_numbers() {
+        let mut scene = built_in();
+        let [ior, roughness, distance] = [1.45_f32, 0.3, 0.2].map(f64::from);
+        scene.materials[0].surface = Surface::Dielectric(Dielectric {
+            ior,
+            roughness,
+            attenuation_color: DVec3::new(1.0, 0.9_f32.into(), 0.7_f32.into()),
+            attenuation_distance: distance,
+            ..Dielectric::default()
+        });
+        for (effect, expected) in [
+            (Effect::Interior, "glass of index 1.45"),
+            (Effect::Roughness, "roughness 0.3"),
+            (Effect::Absorption, "white becomes 1, 0.9, 0.7 over 0.2 m"),
+        ] {
+            let expected = Caller::Material { material: 0, why: expected.into() };
+            assert_eq!(effect.callers(&scene).collect::<Vec<_>>(), [expected]);
+        }
     }
 }

@@ -12,6 +12,13 @@ fn vitrum(folder: &Path, args: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_vitrum")).args(args).current_dir(folder).output().expect("the program starts")
 }
 
+/// On a machine without a Vulkan driver.
+fn without_driver(folder: &Path, args: &[&str]) -> Output {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vitrum"));
+    command.args(args).current_dir(folder).env("VK_DRIVER_FILES", "/nowhere.json");
+    command.env("VK_ICD_FILENAMES", "/nowhere.json").output().expect("the program starts")
+}
+
 fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
@@ -110,17 +117,43 @@ fn bad_usage_and_bad_input_end_with_2_one_line_and_nothing_written() {
 fn without_a_driver_it_ends_with_3() {
     let folder = tempfile::tempdir().expect("a folder");
     for args in [&["devices"][..], &["render", "-o", "a.png"]] {
-        let output = Command::new(env!("CARGO_BIN_EXE_vitrum"))
-            .args(args)
-            .current_dir(folder.path())
-            .env("VK_DRIVER_FILES", "/nowhere.json")
-            .env("VK_ICD_FILENAMES", "/nowhere.json")
-            .output()
-            .expect("the program starts");
+        let output = without_driver(folder.path(), args);
         assert_eq!(output.status.code(), Some(3), "{}", stderr(&output));
         assert!(stderr(&output).contains("ci/setup.sh"), "{}", stderr(&output));
         assert!(files(folder.path()).is_empty());
     }
+}
+
+#[test]
+fn explain_needs_no_driver_and_tells_people_and_programs() {
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("typo.toml"), "[environment]\nvisibel = true\n").expect("a scene");
+    fs::write(folder.path().join("own.toml"), "[render]\neffects = \"shadows\"\n").expect("a scene");
+    let explain = |args: &[&str]| {
+        let output = without_driver(folder.path(), &[&["explain"], args].concat());
+        (output.status.code(), String::from_utf8_lossy(&output.stdout).into_owned(), stderr(&output))
+    };
+    let (code, text, errors) = explain(&[]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""));
+    assert!(text.starts_with("built-in: 4 objects, "), "{text}");
+    assert!(include_str!("../docs/explain.md").contains(&text), "docs/explain.md shows this: {text}");
+
+    let (code, text, errors) = explain(&["--json", "--roughness", "0.3", "--effects", "-nesting"]);
+    assert_eq!((code, errors.as_str()), (Some(0), ""));
+    let json: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+    assert_eq!((&json["schema"], &json["scene"]["name"]), (&1.into(), &"built-in".into()));
+    assert_eq!(json["models"][2]["leaves_out"], serde_json::json!(["roughness", "energy-compensation"]));
+
+    let (code, text, _) = explain(&["own.toml"]);
+    assert_eq!(code, Some(0));
+    assert!(text.contains("wanted all the same\n  shadows "), "the scene's own options count: {text}");
+
+    for (args, wanted) in [(["--json", "typo.toml"], "typo.toml:2"), (["--effects", "magic"], "magic")] {
+        let (code, text, errors) = explain(&args);
+        assert_eq!((code, text.as_str()), (Some(2), ""), "{errors}");
+        assert!(errors.starts_with("error: ") && errors.contains(wanted), "{errors}");
+    }
+    assert_eq!(files(folder.path()), ["own.toml", "typo.toml"], "nothing is written");
 }
 
 #[test]

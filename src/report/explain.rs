@@ -14,8 +14,11 @@ use crate::scene::{MeshFaults, Object, Scene, Surroundings};
 /// Callers of an effect that are told one by one.
 const MOST_CALLERS: usize = 5;
 
-/// Objects that are named one by one.
-const MOST_OBJECTS: usize = 8;
+/// Runs of objects, and meshes, that are named one by one.
+const MOST_NAMED: usize = 8;
+
+/// Effects on a line.
+const MOST_EFFECTS: usize = 7;
 
 /// The whole of it. docs/explain.md describes the members.
 #[derive(Clone, Debug, Serialize)]
@@ -57,7 +60,7 @@ pub struct EffectRow {
 }
 
 /// Something that calls for an effect: numbers count from 1, in the order of the scene file.
-#[derive(Clone, Debug, Serialize)]
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
 #[allow(missing_docs, reason = "docs/explain.md describes the members")]
 pub enum Because {
@@ -116,7 +119,7 @@ impl Explanation {
             vitrum: env!("CARGO_PKG_VERSION"),
             scene: SceneSummary {
                 name: scene.name.clone(),
-                objects: scene.objects.len(),
+                objects: numbers(scene, |_| true).len(),
                 triangles: scene.objects.iter().map(|object| scene.meshes[object.mesh].triangles.len()).sum(),
                 materials: scene.materials.len(),
                 lights: scene.lights.len(),
@@ -141,8 +144,19 @@ impl Explanation {
 
 impl EffectRow {
     fn new(effect: Effect, scene: &Scene, simulated: bool, plans: &[Plan]) -> Self {
-        let mut callers = effect.callers(scene);
-        let because: Vec<_> = callers.by_ref().take(MOST_CALLERS).map(|caller| Because::new(caller, scene)).collect();
+        let mut because = Vec::new();
+        for caller in effect.callers(scene) {
+            let caller = Because::new(caller, scene);
+            // The parts of an object share its number, and repeat each other.
+            if !because.contains(&caller) {
+                because.push(caller);
+            }
+            if because.len() > MOST_CALLERS {
+                break;
+            }
+        }
+        let more = because.len() > MOST_CALLERS;
+        because.truncate(MOST_CALLERS);
         let called_for = !because.is_empty();
         let treatment = |plan: &Plan| {
             let approximates = match simulated {
@@ -160,11 +174,17 @@ impl EffectRow {
             called_for,
             wanted: simulated,
             because,
-            more: callers.next().is_some(),
+            more,
             why_not: (!called_for).then(|| effect.absent()),
             needs: effect.needs().map(Effect::name),
             models: plans.iter().map(|plan| (plan.model.name(), treatment(plan))).collect(),
         }
+    }
+
+    /// Why it is called for, or why not, a line each.
+    fn reasons(&self) -> Vec<String> {
+        let more = self.more.then(|| "and more".into());
+        self.because.iter().map(Because::to_string).chain(more).chain(self.why_not.map(Into::into)).collect()
     }
 }
 
@@ -221,22 +241,28 @@ impl MeshRow {
     }
 }
 
-/// "object 1", "objects 1, 2, 3", "objects 1, 2, ... 40 in all".
+/// "object 1", "objects 1, 2, 4 to 40", "objects 1, 3, 5, 7, 9, 11, 13, 15 and 12 more".
 fn objects(numbers: &[usize]) -> String {
-    let named: Vec<_> = numbers.iter().take(MOST_OBJECTS).map(usize::to_string).collect();
-    let named = named.join(", ");
-    match numbers.len() {
-        1 => format!("object {named}"),
-        count if count > MOST_OBJECTS => format!("objects {named}, ... {count} in all"),
-        _ => format!("objects {named}"),
-    }
+    let runs: Vec<_> = numbers.chunk_by(|a, b| a + 1 == *b).collect();
+    let named = runs.iter().take(MOST_NAMED).map(|run| match run {
+        [first, _, .., last] => format!("{first} to {last}"),
+        few => few.iter().map(usize::to_string).collect::<Vec<_>>().join(", "),
+    });
+    let named = named.collect::<Vec<_>>().join(", ");
+    let more = match runs.iter().skip(MOST_NAMED).map(|run| run.len()).sum() {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    format!("object{} {named}{more}", if numbers.len() == 1 { "" } else { "s" })
 }
 
 impl fmt::Display for Because {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Material { name, objects: numbers, why } => write!(f, "{name:?} of {}: {why}", objects(numbers)),
-            Self::Light { number } => write!(f, "light {number}"),
+            Self::Material { name, objects: numbers, why } => {
+                write!(f, "material {name:?} of {}: {why}", objects(numbers))
+            }
+            Self::Light { number } => write!(f, "point light {number}"),
             Self::Parts { object } => write!(f, "object {object}: bodies in its mesh may overlap"),
             Self::Pair { objects: [a, b] } if a == b => write!(f, "object {a}: parts of it may overlap"),
             Self::Pair { objects: [a, b] } => write!(f, "objects {a} and {b} may overlap"),
@@ -245,13 +271,18 @@ impl fmt::Display for Because {
     }
 }
 
-/// Names, or a dash where there are none.
+/// Names in lines that start where the first one does, or that there are none.
 fn listed(names: &[&str]) -> String {
-    if names.is_empty() { "-".into() } else { names.join(", ") }
+    let lines: Vec<_> = names.chunks(MOST_EFFECTS).map(|names| names.join(", ")).collect();
+    if lines.is_empty() { "nothing".into() } else { lines.join(&format!(",\n{:24}", "")) }
 }
 
 fn counted(count: usize, one: &str) -> String {
-    if count == 1 { format!("1 {one}") } else { format!("{count} {one}s") }
+    match count {
+        0 => format!("no {one}s"),
+        1 => format!("1 {one}"),
+        _ => format!("{count} {one}s"),
+    }
 }
 
 impl fmt::Display for Explanation {
@@ -261,28 +292,32 @@ impl fmt::Display for Explanation {
             [(scene.objects, "object"), (scene.triangles, "triangle"), (scene.lights, "point light")]
                 .map(|(count, one)| counted(count, one));
         let surroundings = match scene.environment {
-            "image" => "an image around it",
+            "image" => "an image as environment",
             _ => "a constant environment",
         };
         writeln!(f, "{}: {objects}, {triangles}, {lights}, {surroundings}", scene.name)?;
 
-        writeln!(f, "\nCalled for")?;
-        for row in self.effects.iter().filter(|row| row.called_for) {
-            let off = if row.wanted { "" } else { " (taken away)" };
-            let mut name = format!("{}{off}", row.name);
-            for because in &row.because {
-                writeln!(f, "  {name:<21} {because}")?;
-                name.clear();
+        for (title, called_for, wanted) in [
+            ("Called for", true, true),
+            ("Called for, but taken away", true, false),
+            ("Not called for", false, false),
+            ("Not called for, but wanted all the same", false, true),
+        ] {
+            let rows = || self.effects.iter().filter(|row| (row.called_for, row.wanted) == (called_for, wanted));
+            if rows().next().is_some() {
+                writeln!(f, "\n{title}")?;
             }
-            if row.more {
-                writeln!(f, "  {:<21} and more", "")?;
-            }
-        }
-        writeln!(f, "\nNot called for")?;
-        for row in self.effects.iter() {
-            if let Some(why) = row.why_not {
-                let on = if row.wanted { "; simulated all the same" } else { "" };
-                writeln!(f, "  {:<21} {why}{on}", row.name)?;
+            let mut last = ("", Vec::new());
+            for row in rows() {
+                let mut reasons = row.reasons();
+                if called_for && reasons == last.1 {
+                    reasons = vec![format!("as for {}", last.0)];
+                } else {
+                    last = (row.name, reasons.clone());
+                }
+                for (i, reason) in reasons.iter().enumerate() {
+                    writeln!(f, "  {:<21} {reason}", if i == 0 { row.name } else { "" })?;
+                }
             }
         }
         writeln!(f, "\nModels")?;
@@ -297,14 +332,169 @@ impl fmt::Display for Explanation {
                 writeln!(f, "  {:<8} cannot see   {unseen}", "")?;
             }
         }
-        writeln!(f, "\nMeshes")?;
-        for mesh in &self.meshes {
-            writeln!(f, "  {}: {}; {}", mesh.name, counted(mesh.triangles, "triangle"), mesh.faults)?;
+        let mut meshes: Vec<_> = self.meshes.iter().collect();
+        meshes.sort_by_key(|mesh| mesh.faults.is_empty());
+        for (i, mesh) in meshes.iter().take(MOST_NAMED).enumerate() {
+            let title = if i == 0 { "\nMeshes\n" } else { "" };
+            writeln!(f, "{title}  {}: {}; {}", mesh.name, counted(mesh.triangles, "triangle"), mesh.faults)?;
+        }
+        if meshes.len() > MOST_NAMED {
+            writeln!(f, "  and {} more", meshes.len() - MOST_NAMED)?;
         }
         for (i, warning) in self.warnings.iter().enumerate() {
             let title = if i == 0 { "\nWarnings\n" } else { "" };
             writeln!(f, "{title}  {warning}")?;
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+    use serde_json::Value;
+
+    use super::*;
+    use crate::scene::{Overrides, PointLight};
+
+    /// Four bodies of one glass; the first and the third may overlap.
+    fn built_in() -> Scene {
+        Scene::load(None, &Overrides::default()).expect("the built-in scene")
+    }
+
+    fn lit(lights: usize) -> Scene {
+        Scene { lights: vec![PointLight { position: DVec3::Y, intensity: DVec3::ONE }; lights], ..built_in() }
+    }
+
+    fn explained(scene: &Scene, effects: &str) -> Explanation {
+        let effects = Some(effects.parse().expect("a selection"));
+        Explanation::new(scene, &RenderArgs { effects, ..RenderArgs::default() }).expect("an explanation")
+    }
+
+    fn row<'e>(explanation: &'e Explanation, effect: &str) -> &'e EffectRow {
+        explanation.effects.iter().find(|row| row.name == effect).expect("a row")
+    }
+
+    fn model<'e>(explanation: &'e Explanation, model: &str) -> &'e ModelRow {
+        explanation.models.iter().find(|row| row.name == model).expect("a row")
+    }
+
+    #[test]
+    fn an_effect_that_is_taken_away_is_told_with_its_callers() {
+        let explanation = explained(&built_in(), "auto,-nesting");
+        let nesting = row(&explanation, "nesting");
+        assert!(nesting.called_for && !nesting.wanted && nesting.why_not.is_none());
+        assert_eq!(nesting.models["single"], Treatment::LeavesOut);
+        assert_eq!(nesting.models["tree"], Treatment::Simulates);
+        assert_eq!(model(&explanation, "single").leaves_out, ["interior"]);
+        let wanted = "\nCalled for, but taken away\n  nesting               objects 1 and 3 may overlap\n\n";
+        assert!(explanation.to_string().contains(wanted), "{explanation}");
+    }
+
+    #[test]
+    fn an_effect_that_is_added_is_wanted_though_nothing_calls_for_it() {
+        let explanation = explained(&built_in(), "auto,shadows");
+        let shadows = row(&explanation, "shadows");
+        assert!(!shadows.called_for && shadows.wanted && shadows.because.is_empty());
+        assert!(model(&explanation, "path").simulates.contains(&"shadows"));
+        let wanted = "\nNot called for, but wanted all the same\n  shadows               no point light shines";
+        assert!(explanation.to_string().contains(wanted), "{explanation}");
+    }
+
+    #[test]
+    fn models_tell_what_they_leave_out_approximate_and_cannot_see() {
+        let explanation = explained(&lit(1), "auto");
+        let single = model(&explanation, "single");
+        assert_eq!(single.simulates, ["reflection", "transmission", "direct-light"]);
+        assert_eq!(single.leaves_out, ["interior", "shadows", "nesting"]);
+        assert_eq!(model(&explanation, "double").approximates, ["interior", "direct-light"]);
+        assert_eq!(row(&explanation, "interior").models["double"], Treatment::Approximates);
+        assert_eq!(row(&explanation, "interior").models["single"], Treatment::LeavesOut);
+        assert_eq!(model(&explanation, "path").unseen.len(), 1);
+        assert!(model(&explanation, "tree").unseen.is_empty());
+        let text = explanation.to_string();
+        for line in ["leaves out   interior, shadows, nesting\n", "cannot see   light of point lights through smooth"] {
+            assert!(text.contains(line), "{text}");
+        }
+        assert!(!explained(&built_in(), "auto").to_string().contains("cannot see"));
+    }
+
+    #[test]
+    fn more_than_five_callers_are_cut_and_equal_ones_told_once() {
+        for (lights, more) in [(5, false), (6, true)] {
+            let explanation = explained(&lit(lights), "auto");
+            let direct = row(&explanation, "direct-light");
+            assert_eq!((direct.because.len(), direct.more), (5, more));
+            let text = explanation.to_string();
+            assert_eq!(text.contains("point light 5\n                        and more\n"), more, "{text}");
+            assert!(text.contains("  shadows               as for direct-light\n"), "{text}");
+        }
+        let mut scene = built_in();
+        scene.objects = vec![scene.objects[0].clone(); 9];
+        let explanation = explained(&scene, "auto");
+        assert_eq!(row(&explanation, "nesting").because, [Because::Pair { objects: [1, 1] }]);
+        assert_eq!(explanation.scene.objects, 1, "parts of one");
+        assert!(explanation.to_string().contains("  nesting               object 1: parts of it may overlap\n"));
+    }
+
+    #[test]
+    fn objects_and_counts_read_well() {
+        assert_eq!(objects(&[3]), "object 3");
+        assert_eq!(objects(&[1, 2]), "objects 1, 2");
+        assert_eq!(objects(&[1, 2, 4, 5, 6, 9]), "objects 1, 2, 4 to 6, 9");
+        let odd: Vec<_> = (1..40).step_by(2).collect();
+        assert_eq!(objects(&odd), "objects 1, 3, 5, 7, 9, 11, 13, 15 and 12 more");
+        assert_eq!([0, 1, 2].map(|count| counted(count, "object")), ["no objects", "1 object", "2 objects"]);
+        let empty = explained(&Scene { objects: Vec::new(), meshes: Vec::new(), ..built_in() }, "auto").to_string();
+        assert!(empty.starts_with("built-in: no objects, no triangles, no point lights, "), "{empty}");
+        assert!(!empty.contains("\nCalled for") && !empty.contains("Meshes"), "{empty}");
+        let all = explained(&built_in(), "all").to_string();
+        assert!(all.lines().all(|line| line.len() <= 120), "{all}");
+    }
+
+    #[test]
+    fn faulty_meshes_come_first_and_many_are_cut() {
+        let mut scene = built_in();
+        scene.meshes = vec![scene.meshes[0].clone(); 10];
+        scene.meshes[9].faults.open_edges = 2;
+        let text = explained(&scene, "auto").to_string();
+        assert!(text.contains("\nMeshes\n  teapot_body.obj: 25582 triangles; 2 open edges\n"), "{text}");
+        assert!(text.ends_with("no faults\n  and 2 more\n"), "{text}");
+    }
+
+    /// Where `value` has members: `scene.name`, `effects[].name`.
+    fn members(value: &Value, at: &str, found: &mut BTreeSet<String>) {
+        match value {
+            Value::Object(object) => {
+                for (name, value) in object {
+                    let at = if at.is_empty() { name.clone() } else { format!("{at}.{name}") };
+                    members(value, &at, found);
+                    found.insert(at);
+                }
+            }
+            Value::Array(items) => items.iter().for_each(|item| members(item, &format!("{at}[]"), found)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn the_json_has_the_members_that_the_docs_name() {
+        let mut scene = lit(1);
+        scene.meshes[0].overlaps = true;
+        scene.camera.position = scene.bounds_of(&scene.objects[0]).center();
+        let json: Value = serde_json::from_str(&explained(&scene, "auto").json()).expect("JSON");
+        assert_eq!((&json["schema"], &json["scene"]["objects"]), (&1.into(), &4.into()));
+        assert_eq!(json["effects"][0]["models"]["single"], "simulates");
+        assert_eq!(json["effects"][2]["models"]["single"], "leaves-out");
+        let mut found = BTreeSet::new();
+        members(&json, "", &mut found);
+        found.retain(|name| !name.starts_with("effects[].models.") && !name.starts_with("meshes[].faults."));
+        let named = |section: &str| -> BTreeSet<String> {
+            let rows = section.lines().filter_map(|line| line.strip_prefix("| `")?.split('|').next());
+            rows.flat_map(|names| names.split('`').step_by(2)).map(Into::into).collect()
+        };
+        let (effects, json) = include_str!("../../docs/explain.md").split_once("## JSON").expect("sections");
+        assert_eq!(found, named(json));
+        assert_eq!(named(effects), Effect::all().map(|effect| effect.name().into()).collect());
     }
 }
