@@ -1,5 +1,5 @@
 //! What it is worth to compile out what a scene does not call for: `cargo bench --bench pruning` prints the table of
-//! docs/effects.md.
+//! docs/explain.md.
 //!
 //! The two take turns in one process; medians of the rounds. Pipelines are compiled anew each time: the driver's cache is
 //! off.
