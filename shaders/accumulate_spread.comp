@@ -17,7 +17,9 @@ void main()
     vec4 value = texelFetch(radiance, pixel, 0);
     Moments moments = Moments(value.rgb, vec3(0.0));
     if (sampleIndex != 0) {
-        moments = WithOneMore(Moments(imageLoad(mean, pixel).rgb, imageLoad(spread, pixel).rgb), sampleIndex, value.rgb);
+        vec4 before = imageLoad(mean, pixel);
+        moments = WithOneMore(Moments(before.rgb, imageLoad(spread, pixel).rgb), sampleIndex, value.rgb);
+        value.a = before.a + (value.a - before.a) / float(sampleIndex + 1);
     }
     imageStore(mean, pixel, vec4(moments.mean, value.a));
     imageStore(spread, pixel, vec4(moments.squares, float(sampleIndex + 1)));

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::effects::{Effect, Effects, SMOOTH};
-use crate::options::{Aov, DebugControls, Model, RenderArgs, Size, Tonemap, Trace};
+use crate::options::{Aov, DebugControls, MOST_SAMPLES, Model, RenderArgs, Size, Tonemap, Trace};
 use crate::scene::{Scene, Surface};
 use crate::{Error, Result};
 
@@ -91,9 +91,6 @@ impl Budget {
         }
     }
 }
-
-/// Samples that a time budget ends with at the latest.
-const MOST_SAMPLES: u32 = 1 << 20;
 
 /// Samples per pixel, where the user has no wish.
 const SAMPLES: u32 = 16;

@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
-use crate::cost::Measurement;
+use crate::cost::{Measurement, REFERENCE_DEPTH};
 use crate::effects::Selection;
 use crate::gpu::{Gpu, Instance};
 use crate::image::{check_folder, make_folder};
@@ -48,7 +48,7 @@ pub(super) struct CostCommand {
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Selection>,
 
-    /// Longest chain of interfaces [default: 32; of the reference: 1024]
+    /// Longest chain of interfaces of the reference, and of the settings of path that follow as long ones [default: 1024]
     #[arg(long, value_name = "N", value_parser = range::max_depth)]
     max_depth: Option<u32>,
 
@@ -92,7 +92,6 @@ impl CostCommand {
         let options = RenderArgs {
             size: Some(size),
             seed: self.seed.or(scene.render.seed),
-            max_depth: self.max_depth.or(scene.render.max_depth),
             effects: self.effects.clone().or(scene.render.effects.clone()),
             trace: self.trace.or(scene.render.trace),
             ..RenderArgs::default()
@@ -113,7 +112,7 @@ impl CostCommand {
             scene: &scene,
             options,
             folder: folder.into(),
-            reference_depth: self.max_depth,
+            depth: self.max_depth.unwrap_or(REFERENCE_DEPTH),
             half: Duration::from_secs_f64(self.reference_time.unwrap_or(REFERENCE_SECONDS) / 2.0),
         };
         let cost = measurement.run(&mut |what, share| {
@@ -121,9 +120,18 @@ impl CostCommand {
             bar.set_message(what.to_owned());
         })?;
         bar.finish_and_clear();
-        let report = CostReport::new(gpu.info(), &scene, size, self.command(), &cost);
+        let report = CostReport::new(gpu.info(), &measurement, size, self.command(), &cost);
         report.write(folder, &cost)?;
-        print(&report.table())?;
+        for warning in &cost.reference.warnings {
+            talk.note(&format!("warning: {warning}"));
+        }
+        if !cost.reference.unseen.is_empty() {
+            let what = cost.reference.unseen.join("; ");
+            talk.note(&format!("note: the reference lacks {what}; what shows it counts as wrong"));
+        }
+        if !talk.quiet {
+            print(&report.table())?;
+        }
         talk.note(&format!("{}: {:.0} s", folder.join("index.html").display(), cost.taken.as_secs_f64()));
         Ok(())
     }

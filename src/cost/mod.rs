@@ -13,6 +13,8 @@ use std::time::{Duration, Instant};
 pub use error::Estimate;
 pub use settings::{Setting, settings};
 
+use xxhash_rust::xxh3::xxh3_64;
+
 use crate::compare::flip;
 use crate::effects::{Effect, Effects};
 use crate::gpu::Gpu;
@@ -36,7 +38,7 @@ const LONG: Duration = Duration::from_secs(3);
 const TOO_LONG_MS: f64 = 20e3;
 
 /// The longest chain of interfaces of the reference, where the user has no wish: what is trapped for longer is faint.
-const REFERENCE_DEPTH: u32 = 1024;
+pub const REFERENCE_DEPTH: u32 = 1024;
 
 /// Seeds of the halves of the reference, beside that of the pictures.
 const REFERENCE_SEEDS: [u64; 2] = [0x5eed_0001, 0x5eed_0002];
@@ -55,6 +57,10 @@ pub struct Reference {
     pub resumed: u32,
     /// relMSE of the mean that is noise.
     pub noise: f64,
+    /// Light in the scene that it lacks, in words.
+    pub unseen: Vec<&'static str>,
+    /// What a user should hear of.
+    pub warnings: Vec<String>,
 }
 
 /// A setting, measured.
@@ -63,8 +69,10 @@ pub struct Measured {
     pub setting: Setting,
     /// What that amounts to.
     pub plan: Plan,
-    /// Milliseconds of each run: on the device, or where that has no clock on the host.
+    /// Milliseconds of each run: on the device, or where that has no clock on the host, without set-up.
     pub times: Vec<f64>,
+    /// Milliseconds until the pipelines had run once, the first time: less where the driver knew them already.
+    pub pipelines_ms: f64,
     /// relMSE against the reference.
     pub relmse: Estimate,
     /// FLIP against the mean of the reference.
@@ -94,8 +102,6 @@ pub struct EffectCost {
 pub struct Share {
     /// Median of the runs, in milliseconds.
     pub ms: f64,
-    /// Milliseconds until the pipelines had run once.
-    pub pipelines_ms: f64,
     /// relMSE against the reference.
     pub relmse: Estimate,
 }
@@ -118,12 +124,12 @@ pub struct Measurement<'a> {
     pub gpu: &'a Gpu,
     /// The scene, its camera framed.
     pub scene: &'a Scene,
-    /// Size, seed, effects, tracer; what else there is, is set by the settings.
+    /// Size, seed, effects, tracer; the settings say the rest.
     pub options: RenderArgs,
     /// Where the halves of the reference are kept.
     pub folder: PathBuf,
     /// The longest chain of interfaces of the reference.
-    pub reference_depth: Option<u32>,
+    pub depth: u32,
     /// How long each half of the reference may be worked at.
     pub half: Duration,
 }
@@ -133,7 +139,7 @@ impl Measurement<'_> {
     pub fn run(&self, progress: &mut dyn FnMut(&str, f64)) -> Result<Cost> {
         let start = Instant::now();
         let reference = self.reference(progress)?;
-        let settings = settings();
+        let settings = settings(self.depth);
         let wanted = self.options.effects.clone().unwrap_or_default().resolve(self.scene);
         let steps = (settings.len() + wanted.iter().count()) as f64;
         let done = |step: usize| 0.4 + 0.6 * step as f64 / steps;
@@ -157,15 +163,17 @@ impl Measurement<'_> {
     fn reference(&self, progress: &mut dyn FnMut(&str, f64)) -> Result<Reference> {
         let mut samples = 0;
         let mut resumed = 0;
+        let mut unseen = Vec::new();
+        let mut warnings = Vec::new();
         let mut display = Vec::new();
         let mut halves = Vec::new();
         for (number, seed) in (0..).zip(REFERENCE_SEEDS) {
             progress("reference", 0.2 * f64::from(number));
-            let file = self.folder.join(format!("reference-{}.state", number + 1));
+            let file = self.folder.join(format!("reference-{:016x}-{}.state", self.hash(), number + 1));
             let args = RenderArgs {
                 model: Some(Model::Path),
                 seed: Some(self.options.seed.unwrap_or(0) ^ seed),
-                max_depth: self.reference_depth.or(Some(REFERENCE_DEPTH)),
+                max_depth: Some(self.depth),
                 tolerance: Some(REFERENCE_TOLERANCE),
                 time_budget: Some(self.half.as_secs_f64()),
                 checkpoint: Some(file.clone()),
@@ -173,8 +181,9 @@ impl Measurement<'_> {
             };
             let plan = Plan::new(self.scene, &args)?;
             let half = match passes::render(self.gpu, self.scene, &plan, &mut |_| {}) {
-                // It holds another scene's, or is damaged: there is no loss in making it again.
-                Err(Error::Input { path, .. }) if path == file => {
+                // What it holds is of a scene, a device or a program that have changed since.
+                Err(error @ Error::Input { .. }) if passes::is_checkpoint(&file) => {
+                    warnings.push(format!("{}; the reference is made anew", error.in_full()));
                     std::fs::remove_file(&file).map_err(|source| Error::file(&file, "remove", source))?;
                     passes::render(self.gpu, self.scene, &plan, &mut |_| {})?
                 }
@@ -185,34 +194,44 @@ impl Measurement<'_> {
             if display.is_empty() {
                 display = half.display;
             }
+            warnings.extend(half.warnings);
+            unseen = plan.unseen;
             halves.push(half.radiance);
         }
         let [first, second] = [halves.swap_remove(0), halves.swap_remove(0)];
         let mean = error::mean(&first, &second);
         let noise = error::noise(&first, &second, &mean);
-        Ok(Reference { halves: [first, second], mean, display, samples, resumed, noise })
+        Ok(Reference { halves: [first, second], mean, display, samples, resumed, noise, unseen, warnings })
+    }
+
+    /// Tells references of different scenes and options apart, by their names.
+    fn hash(&self) -> u64 {
+        xxh3_64(format!("{} --max-depth {} {}", self.scene.name, self.depth, self.options).as_bytes())
     }
 
     fn measure(&self, setting: &Setting, reference: &Reference) -> Result<Measured> {
         let plan = Plan::new(self.scene, &setting.on(&self.options))?;
-        let (times, rendered) = self.timed(&plan)?;
+        let (times, pipelines_ms, rendered) = self.timed(&plan)?;
         let relmse = reference.relmse(&rendered.radiance);
         let width = plan.size.width as usize;
         let flip = flip::hdr(width, &rendered.radiance, &reference.mean);
-        Ok(Measured { setting: setting.clone(), plan, times, relmse, flip, rendered, is_best: false })
+        Ok(Measured { setting: setting.clone(), plan, times, pipelines_ms, relmse, flip, rendered, is_best: false })
     }
 
     /// Renders until the time of it is known.
-    fn timed(&self, plan: &Plan) -> Result<(Vec<f64>, Rendered)> {
+    fn timed(&self, plan: &Plan) -> Result<(Vec<f64>, f64, Rendered)> {
         let start = Instant::now();
         let mut times = Vec::new();
+        let mut pipelines_ms = None;
         loop {
             let begun = Instant::now();
             let rendered = passes::render(self.gpu, self.scene, plan, &mut |_| {})?;
             let device: Option<f64> = rendered.passes.iter().map(|pass| pass.gpu_ms).sum();
-            times.push(device.unwrap_or(begun.elapsed().as_secs_f64() * 1e3));
+            let host = begun.elapsed().saturating_sub(rendered.upload + rendered.pipelines);
+            times.push(device.unwrap_or(host.as_secs_f64() * 1e3));
+            let pipelines_ms = *pipelines_ms.get_or_insert(rendered.pipelines.as_secs_f64() * 1e3);
             if times.len() == MOST_RUNS || start.elapsed() > LONG {
-                return Ok((times, rendered));
+                return Ok((times, pipelines_ms, rendered));
             }
         }
     }
@@ -228,12 +247,8 @@ impl Measurement<'_> {
         let share = |effects: &str| -> Result<Share> {
             let effects = Some(effects.parse().map_err(Error::Usage)?);
             let plan = Plan::new(self.scene, &RenderArgs { effects, ..setting.on(&self.options) })?;
-            let (times, rendered) = self.timed(&plan)?;
-            Ok(Share {
-                ms: median(&times),
-                pipelines_ms: rendered.pipelines.as_secs_f64() * 1e3,
-                relmse: reference.relmse(&rendered.radiance),
-            })
+            let (times, _, rendered) = self.timed(&plan)?;
+            Ok(Share { ms: median(&times), relmse: reference.relmse(&rendered.radiance) })
         };
         let names = wanted.names().join(",");
         let with = share(&names)?;
@@ -262,16 +277,35 @@ impl Measured {
     }
 }
 
-/// Marks what nothing else beats in both time and error. An error that is told as 0 or less counts as its own uncertainty.
+/// Marks what nothing else beats in both time and error; an error counts as its uncertainty at least.
 fn mark_best(entries: &mut [Measured]) {
     let points: Vec<_> = entries.iter().map(|entry| (entry.ms(), entry.relmse.at_least())).collect();
-    for (entry, &(ms, error)) in entries.iter_mut().zip(&points) {
-        entry.is_best = !points.iter().any(|&(t, e)| t <= ms && e <= error && (t < ms || e < error));
+    for (entry, is_best) in entries.iter_mut().zip(best(&points)) {
+        entry.is_best = is_best;
     }
+}
+
+/// Which pairs no other one undercuts; none that is not finite.
+fn best(points: &[(f64, f64)]) -> Vec<bool> {
+    let is_beaten =
+        |&(ms, error): &(f64, f64)| points.iter().any(|&(t, e)| t <= ms && e <= error && (t < ms || e < error));
+    points.iter().map(|point| point.0.is_finite() && point.1.is_finite() && !is_beaten(point)).collect()
 }
 
 fn median(values: &[f64]) -> f64 {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
+    sorted.get(sorted.len().saturating_sub(1) / 2).copied().unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_beaten_or_not_finite_is_not_best() {
+        let points = [(1.0, 0.1), (2.0, 0.1), (2.0, 0.05), (3.0, f64::NAN), (f64::NAN, 0.01), (4.0, 0.04), (1.0, 0.1)];
+        assert_eq!(best(&points), [true, false, true, false, false, true, true]);
+        assert_eq!([median(&[3.0, 1.0]), median(&[3.0, 1.0, 2.0])], [1.0, 2.0]);
+    }
 }

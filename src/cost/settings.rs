@@ -26,7 +26,7 @@ impl Setting {
         RenderArgs {
             model: Some(self.model),
             samples: Some(self.samples),
-            max_depth: self.max_depth.or(options.max_depth),
+            max_depth: self.max_depth,
             tolerance: self.tolerance,
             ..options.clone()
         }
@@ -58,8 +58,8 @@ impl Setting {
     }
 }
 
-/// Those that are tried, the cheap ones of a model first.
-pub fn settings() -> Vec<Setting> {
+/// Those that are tried, the cheap ones of a model first, against a reference whose chains are of up to `depth` interfaces.
+pub fn settings(depth: u32) -> Vec<Setting> {
     let rows: [(Model, &[u32]); 4] = [
         (Model::Single, &[1, 4, 16]),
         (Model::Double, &[1, 4, 16]),
@@ -69,7 +69,7 @@ pub fn settings() -> Vec<Setting> {
     let mut all: Vec<_> =
         rows.iter().flat_map(|&(model, counts)| counts.iter().map(move |&n| Setting::of(model, n))).collect();
     // As long chains as the reference follows: more samples are all that it takes from there.
-    let deep = |samples| Setting { max_depth: Some(super::REFERENCE_DEPTH), ..Setting::of(Model::Path, samples) };
+    let deep = |samples| Setting { max_depth: Some(depth), ..Setting::of(Model::Path, samples) };
     all.extend([4, 16, 64].map(deep));
     let tree = Setting::of(Model::Tree, 4);
     all.extend([4, 8].map(|depth| Setting { max_depth: Some(depth), ..tree.clone() }));

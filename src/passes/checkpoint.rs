@@ -56,6 +56,13 @@ pub(super) fn key(gpu: &Gpu, plan: &Plan, trace: Option<Trace>, scene: Option<u1
     entries.map(|(name, value)| (name.to_owned(), value)).into()
 }
 
+/// Whether the file at `path` is a checkpoint, of whatever render.
+pub fn is_checkpoint(path: &Path) -> bool {
+    let mut line = Vec::new();
+    let read = |file| BufReader::new(file).take(MOST_HEAD).read_until(b'\n', &mut line);
+    File::open(path).and_then(read).is_ok() && serde_json::from_slice::<Head>(&line).is_ok()
+}
+
 /// How far a render is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 pub(super) struct Progress {

@@ -48,6 +48,7 @@ use single::Single;
 use tree::{Tree, TreeTargets};
 
 pub use aov::Aovs;
+pub use checkpoint::is_checkpoint;
 pub use counts::{Counts, relative_error};
 pub use probe::{Hit, Leaks, Ray, TraceProbe};
 pub use sampling::pixel_offsets;

@@ -7,11 +7,10 @@ use serde::Serialize;
 
 use super::cost_page;
 use super::stats::DeviceStats;
-use crate::cost::{Cost, EffectCost, Estimate, Measured, Setting, Share, TARGETS};
+use crate::cost::{Cost, EffectCost, Estimate, Measured, Measurement, Setting, TARGETS};
 use crate::gpu::DeviceInfo;
 use crate::image::{OutputFile, encode_png};
-use crate::options::{Model, Size};
-use crate::scene::Scene;
+use crate::options::{MOST_SAMPLES, Model, Size};
 use crate::{Error, Result};
 
 /// Schema 1 of `cost.json`. What is not finite, or does not apply, is null.
@@ -39,6 +38,8 @@ pub struct ReferenceRow {
     pub samples: u32,
     pub resumed: u32,
     pub noise: f64,
+    pub max_depth: u32,
+    pub unseen: Vec<&'static str>,
     pub image: String,
 }
 
@@ -85,16 +86,15 @@ pub struct EffectRow {
     pub samples: u32,
     pub gpu_ms_with: f64,
     pub gpu_ms_without: f64,
-    pub pipelines_ms_with: f64,
-    pub pipelines_ms_without: f64,
     pub relmse_with: f64,
     pub relmse_without: f64,
     pub relmse_error: f64,
 }
 
 impl CostReport {
-    /// A report on `scene`; `command` repeats it.
-    pub fn new(device: &DeviceInfo, scene: &Scene, size: Size, command: String, cost: &Cost) -> Self {
+    /// A report on what was measured; `command` repeats it.
+    pub fn new(device: &DeviceInfo, measurement: &Measurement<'_>, size: Size, command: String, cost: &Cost) -> Self {
+        let (scene, depth) = (measurement.scene, measurement.depth);
         let reference = &cost.reference;
         Self {
             schema: 1,
@@ -109,6 +109,8 @@ impl CostReport {
                 samples: reference.samples,
                 resumed: reference.resumed,
                 noise: reference.noise,
+                max_depth: depth,
+                unseen: reference.unseen.clone(),
                 image: "reference.png".into(),
             },
             entries: cost.entries.iter().enumerate().map(EntryRow::new).collect(),
@@ -187,7 +189,13 @@ impl CostReport {
 
 /// An error with its digits; below its uncertainty, that.
 pub(super) fn error(value: f64, uncertainty: f64) -> String {
-    if value > uncertainty { format!("{value:.1e}") } else { format!("<{uncertainty:.0e}") }
+    if !value.is_finite() {
+        "not finite".into()
+    } else if value > uncertainty {
+        format!("{value:.1e}")
+    } else {
+        format!("<{uncertainty:.0e}")
+    }
 }
 
 impl EntryRow {
@@ -201,7 +209,7 @@ impl EntryRow {
             max_depth: entry.plan.max_depth,
             gpu_ms: entry.ms(),
             gpu_ms_runs: entry.times.clone(),
-            pipelines_ms: entry.rendered.pipelines.as_secs_f64() * 1e3,
+            pipelines_ms: entry.pipelines_ms,
             relmse,
             relmse_error,
             flip: entry.flip.mean,
@@ -230,6 +238,9 @@ impl TargetRow {
             return Self { relmse, options: None, gpu_ms: None, extrapolated: false };
         };
         let samples = (f64::from(last.rendered.samples) * last.relmse.value / relmse).ceil();
+        if samples > f64::from(MOST_SAMPLES) {
+            return Self { relmse, options: None, gpu_ms: None, extrapolated: false };
+        }
         Self {
             relmse,
             options: Some(Setting { samples: samples as u32, ..last.setting.clone() }.options()),
@@ -242,18 +253,15 @@ impl TargetRow {
 impl EffectRow {
     fn new(cost: &EffectCost) -> Self {
         let EffectCost { effect, model, samples, with, without } = cost;
-        let Share { ms, pipelines_ms, relmse } = *with;
         Self {
             effect: effect.name(),
             model: model.name(),
             samples: *samples,
-            gpu_ms_with: ms,
+            gpu_ms_with: with.ms,
             gpu_ms_without: without.ms,
-            pipelines_ms_with: pipelines_ms,
-            pipelines_ms_without: without.pipelines_ms,
-            relmse_with: relmse.value,
+            relmse_with: with.relmse.value,
             relmse_without: without.relmse.value,
-            relmse_error: relmse.error.max(without.relmse.error),
+            relmse_error: with.relmse.error.max(without.relmse.error),
         }
     }
 }

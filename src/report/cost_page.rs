@@ -80,7 +80,6 @@ pub(super) fn html(report: &CostReport) -> std::io::Result<String> {
     if !report.effects.is_empty() {
         text += "<h2>Effects</h2>\n<p>The same frame with an effect and without it: what it costs, and the error that leaving it out \
                  makes.</p>\n<table>\n<tr><th>effect</th><th>model</th><th class=\"n\">ms with</th><th class=\"n\">without</th>\
-                 <th class=\"n\">pipelines, ms, with</th><th class=\"n\">without</th>\
                  <th class=\"n\">relMSE with</th><th class=\"n\">without</th></tr>\n";
     }
     for row in &report.effects {
@@ -88,14 +87,8 @@ pub(super) fn html(report: &CostReport) -> std::io::Result<String> {
         let _ = writeln!(
             text,
             "<tr><td>{}</td><td><code>{}</code>, {} samples</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.1}</td>\
-             <td class=\"n\">{:.0}</td><td class=\"n\">{:.0}</td><td class=\"n\">{with}</td><td class=\"n\">{without}</td></tr>",
-            row.effect,
-            row.model,
-            row.samples,
-            row.gpu_ms_with,
-            row.gpu_ms_without,
-            row.pipelines_ms_with,
-            row.pipelines_ms_without
+             <td class=\"n\">{with}</td><td class=\"n\">{without}</td></tr>",
+            row.effect, row.model, row.samples, row.gpu_ms_with, row.gpu_ms_without
         );
     }
     if !report.effects.is_empty() {
@@ -132,6 +125,11 @@ fn point(row: &EntryRow) -> (f64, f64) {
     (row.gpu_ms.max(1e-6).log10(), row.relmse.max(row.relmse_error).max(1e-12).log10())
 }
 
+/// What a plot can show.
+fn shown(report: &CostReport) -> impl Iterator<Item = &EntryRow> + Clone {
+    report.entries.iter().filter(|row| row.relmse.is_finite() && row.gpu_ms.is_finite())
+}
+
 /// An axis over whole powers of ten.
 fn axis(values: impl Iterator<Item = f64>) -> Axis {
     let (least, most) =
@@ -143,7 +141,7 @@ fn axis(values: impl Iterator<Item = f64>) -> Axis {
 /// relMSE against milliseconds, both logarithmic: a curve for each model, settings apart from its samples as points.
 fn plot(report: &CostReport) -> std::io::Result<String> {
     let mut text = String::new();
-    let points = || report.entries.iter().map(point);
+    let points = || shown(report).map(point);
     let draw = |text| -> Drawn {
         let root = SVGBackend::with_string(text, SIZE).into_drawing_area();
         root.fill(&WHITE)?;
@@ -165,14 +163,14 @@ fn plot(report: &CostReport) -> std::io::Result<String> {
             .x_label_formatter(&|place| power_of_ten(place.round() as i32))
             .y_label_formatter(&|place| power_of_ten(place.round() as i32))
             .draw()?;
-        let mut best: Vec<_> = report.entries.iter().filter(|row| row.pareto).map(point).collect();
+        let mut best: Vec<_> = shown(report).filter(|row| row.pareto).map(point).collect();
         best.sort_by(|a, b| a.0.total_cmp(&b.0));
         chart
             .draw_series(DashedLineSeries::new(best, 6, 5, INK.stroke_width(1)))?
             .label("nothing else is both faster and closer")
             .legend(|(x, y)| PathElement::new([(x, y), (x + 26, y)], INK.stroke_width(1)));
         for (model, color) in Model::ALL.into_iter().zip(COLORS) {
-            let rows = || report.entries.iter().filter(move |row| row.model == model.name());
+            let rows = || shown(report).filter(move |row| row.model == model.name());
             let is_plain =
                 |row: &&EntryRow| !row.options.contains("--max-depth") && !row.options.contains("--tolerance");
             chart
