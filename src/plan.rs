@@ -103,7 +103,7 @@ const NORMALS: u32 = 256;
 const NORMALS_A_SAMPLE: RangeInclusive<u32> = 8..=16;
 
 /// The longest chain of interfaces, where the user has no wish.
-const DEPTH: u32 = 32;
+pub const DEPTH: u32 = 32;
 
 /// The same where a tolerance is asked for: long enough that few pixels miss it, short enough to end.
 const DEPTH_OF_TOLERANCE: u32 = 1024;

@@ -98,6 +98,7 @@ fn bad_usage_ends_with_2() {
         (&["none.toml", "-o", "report"], "none.toml"),
         (&["scene.toml", "-o", "report", "--reference-time", "0"], "--reference-time"),
         (&["scene.toml", "-o", "report", "--effects", "magic"], "magic"),
+        (&["scene.toml", "-o", "report", "--max-depth", "8"], "32 or more"),
         (&["scene.toml", "-o", "file"], "file"),
     ] {
         let output = cost(folder, args);

@@ -12,6 +12,7 @@ use crate::effects::Selection;
 use crate::gpu::{Gpu, Instance};
 use crate::image::{check_folder, make_folder};
 use crate::options::{RenderArgs, Size, Trace, range};
+use crate::plan::DEPTH;
 use crate::report::CostReport;
 use crate::scene::{Overrides, Scene};
 use crate::{Error, Result};
@@ -27,7 +28,10 @@ const NO_FOLDER: &str = "is a file; the report is a folder: name one";
 
 /// Options of `vitrum cost`.
 #[derive(Debug, Args)]
-#[command(allow_negative_numbers = true)]
+#[command(
+    allow_negative_numbers = true,
+    after_help = "docs/cost.md says how it is measured, and has the members of cost.json."
+)]
 pub(super) struct CostCommand {
     /// A .toml scene, or a bare .obj shown as clear glass; none: the built-in teapot and cups
     scene: Option<PathBuf>,
@@ -85,6 +89,12 @@ impl CostCommand {
         let folder =
             self.output.as_deref().ok_or_else(|| Error::Usage("cost needs a folder for its report: -o DIR".into()))?;
         check_folder(folder, NO_FOLDER)?;
+        if let Some(depth) = self.max_depth.filter(|&depth| depth < DEPTH) {
+            let why = format!(
+                "the settings follow up to {DEPTH} interfaces, and the reference must, too; give {DEPTH} or more"
+            );
+            return Err(Error::Usage(format!("--max-depth {depth}: {why}")));
+        }
         let overrides = Overrides { ior: self.ior, roughness: self.roughness, environment: self.env.clone() };
         let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
         let size = self.size.unwrap_or(SIZE);

@@ -73,7 +73,8 @@ pub fn settings(depth: u32) -> Vec<Setting> {
     all.extend([4, 16, 64].map(deep));
     let tree = Setting::of(Model::Tree, 4);
     all.extend([4, 8].map(|depth| Setting { max_depth: Some(depth), ..tree.clone() }));
-    all.extend([1e-1, 1e-2].map(|tolerance| Setting { tolerance: Some(tolerance), ..tree.clone() }));
+    let close = |tolerance| Setting { max_depth: Some(depth), tolerance: Some(tolerance), ..tree.clone() };
+    all.extend([1e-1, 1e-2].map(close));
     all
 }
 

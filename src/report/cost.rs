@@ -87,8 +87,9 @@ pub struct EffectRow {
     pub gpu_ms_with: f64,
     pub gpu_ms_without: f64,
     pub relmse_with: f64,
+    pub relmse_with_error: f64,
     pub relmse_without: f64,
-    pub relmse_error: f64,
+    pub relmse_without_error: f64,
 }
 
 impl CostReport {
@@ -176,7 +177,8 @@ impl CostReport {
             );
         }
         for row in &self.effects {
-            let [with, without] = [row.relmse_with, row.relmse_without].map(|value| error(value, row.relmse_error));
+            let with = error(row.relmse_with, row.relmse_with_error);
+            let without = error(row.relmse_without, row.relmse_without_error);
             let _ = writeln!(
                 text,
                 "  {:<20} {:<6} {:>10.1} {:>10.1} {with:>9} {without:>9}",
@@ -260,8 +262,9 @@ impl EffectRow {
             gpu_ms_with: with.ms,
             gpu_ms_without: without.ms,
             relmse_with: with.relmse.value,
+            relmse_with_error: with.relmse.error,
             relmse_without: without.relmse.value,
-            relmse_error: with.relmse.error.max(without.relmse.error),
+            relmse_without_error: without.relmse.error,
         }
     }
 }

@@ -78,12 +78,13 @@ pub(super) fn html(report: &CostReport) -> std::io::Result<String> {
     }
     text += "</table>\n";
     if !report.effects.is_empty() {
-        text += "<h2>Effects</h2>\n<p>The same frame with an effect and without it: what it costs, and the error that leaving it out \
-                 makes.</p>\n<table>\n<tr><th>effect</th><th>model</th><th class=\"n\">ms with</th><th class=\"n\">without</th>\
+        text += "<h2>Effects</h2>\n<p>The same frame with an effect and without it: what it costs, and how far off the picture is. \
+                 The noise of <code>path</code> is in both.</p>\n<table>\n<tr><th>effect</th><th>model</th><th class=\"n\">ms with</th><th class=\"n\">without</th>\
                  <th class=\"n\">relMSE with</th><th class=\"n\">without</th></tr>\n";
     }
     for row in &report.effects {
-        let [with, without] = [row.relmse_with, row.relmse_without].map(|x| escaped(&error(x, row.relmse_error)));
+        let with = escaped(&error(row.relmse_with, row.relmse_with_error));
+        let without = escaped(&error(row.relmse_without, row.relmse_without_error));
         let _ = writeln!(
             text,
             "<tr><td>{}</td><td><code>{}</code>, {} samples</td><td class=\"n\">{:.1}</td><td class=\"n\">{:.1}</td>\
