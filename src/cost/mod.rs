@@ -7,6 +7,7 @@
 mod error;
 mod settings;
 
+use std::collections::HashMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -153,9 +154,10 @@ impl Measurement<'_> {
         }
         mark_best(&mut entries);
         let mut effects = Vec::new();
+        let mut whole = HashMap::new();
         for (step, effect) in wanted.iter().enumerate() {
             progress(effect.name(), done(settings.len() + step));
-            effects.extend(self.effect(effect, wanted, &reference)?);
+            effects.extend(self.effect(effect, wanted, &reference, &mut whole)?);
         }
         Ok(Cost { reference, entries, effects, taken: start.elapsed() })
     }
@@ -236,8 +238,15 @@ impl Measurement<'_> {
         }
     }
 
-    /// What `effect` costs and is worth, in the first model that simulates it as it is.
-    fn effect(&self, effect: Effect, wanted: Effects, reference: &Reference) -> Result<Option<EffectCost>> {
+    /// What `effect` costs and is worth, in the first model that simulates it as it is; `whole` keeps what models make of all that is
+    /// wanted.
+    fn effect(
+        &self,
+        effect: Effect,
+        wanted: Effects,
+        reference: &Reference,
+        whole: &mut HashMap<&'static str, Share>,
+    ) -> Result<Option<EffectCost>> {
         let exact = |model: &Model| effect.honoured_by(*model) && !effect.approximated_by(*model, self.scene);
         let simulates_all = |model: &Model| wanted.iter().all(|e| e.honoured_by(*model));
         let Some(model) = [Model::Tree, Model::Path].into_iter().filter(simulates_all).find(exact) else {
@@ -251,7 +260,10 @@ impl Measurement<'_> {
             Ok(Share { ms: median(&times), relmse: reference.relmse(&rendered.radiance) })
         };
         let names = wanted.names().join(",");
-        let with = share(&names)?;
+        let with = match whole.get(model.name()) {
+            Some(&with) => with,
+            None => *whole.entry(model.name()).or_insert(share(&names)?),
+        };
         let without = share(&format!("{names},-{}", effect.name()))?;
         Ok(Some(EffectCost { effect, model, samples: setting.samples, with, without }))
     }
