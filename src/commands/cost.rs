@@ -6,7 +6,7 @@ use std::time::Duration;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{Talk, devices, print};
+use super::{Changes, Talk, devices, print};
 use crate::cost::{Measurement, REFERENCE_DEPTH};
 use crate::effects::Selection;
 use crate::gpu::{Gpu, Instance};
@@ -14,7 +14,7 @@ use crate::image::{check_folder, make_folder};
 use crate::options::{RenderArgs, Size, Trace, range};
 use crate::plan::DEPTH;
 use crate::report::CostReport;
-use crate::scene::{Overrides, Scene};
+use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// The size of the pictures, where the user has no wish: errors hardly depend on it, and time is pixels.
@@ -60,17 +60,8 @@ pub(super) struct CostCommand {
     #[arg(long, value_name = "N", value_parser = range::seed)]
     seed: Option<u64>,
 
-    /// Index of refraction of every dielectric
-    #[arg(long, value_name = "X", value_parser = range::ior)]
-    ior: Option<f64>,
-
-    /// Roughness of every dielectric, 0 to 1
-    #[arg(long, value_name = "X", value_parser = range::unit)]
-    roughness: Option<f64>,
-
-    /// Environment image in place of the scene's
-    #[arg(long, value_name = "FILE")]
-    env: Option<PathBuf>,
+    #[command(flatten)]
+    changes: Changes,
 
     /// Vulkan device: part of its name, its index, or "list" [default: the best one]
     #[arg(long, value_name = "NAME|INDEX|list", env = "VITRUM_DEVICE")]
@@ -95,8 +86,7 @@ impl CostCommand {
             );
             return Err(Error::Usage(format!("--max-depth {depth}: {why}")));
         }
-        let overrides = Overrides { ior: self.ior, roughness: self.roughness, environment: self.env.clone() };
-        let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
+        let mut scene = Scene::load(self.scene.as_deref(), &self.changes.overrides())?;
         let size = self.size.unwrap_or(SIZE);
         scene.frame(f64::from(size.width) / f64::from(size.height));
         let options = RenderArgs {
@@ -158,9 +148,9 @@ impl CostCommand {
             ("--effects ", self.effects.as_ref().map(Selection::to_string)),
             ("--max-depth ", self.max_depth.map(|x| x.to_string())),
             ("--seed ", self.seed.map(|x| x.to_string())),
-            ("--ior ", self.ior.map(|x| x.to_string())),
-            ("--roughness ", self.roughness.map(|x| x.to_string())),
-            ("--env ", self.env.as_ref().map(path)),
+            ("--ior ", self.changes.ior.map(|x| x.to_string())),
+            ("--roughness ", self.changes.roughness.map(|x| x.to_string())),
+            ("--env ", self.changes.env.as_ref().map(path)),
             ("--device ", self.device.clone().map(quoted)),
             ("--trace ", self.trace.map(|trace| trace.name().to_owned())),
         ];

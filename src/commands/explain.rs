@@ -4,12 +4,12 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::print;
+use super::{Changes, print};
 use crate::Result;
 use crate::effects::Selection;
-use crate::options::{RenderArgs, range};
+use crate::options::RenderArgs;
 use crate::report::Explanation;
-use crate::scene::{Overrides, Scene};
+use crate::scene::Scene;
 
 /// Options of `vitrum explain`.
 #[derive(Debug, Args)]
@@ -26,23 +26,13 @@ pub(super) struct ExplainCommand {
     #[arg(long, value_name = "LIST", allow_hyphen_values = true)]
     effects: Option<Selection>,
 
-    /// Index of refraction of every dielectric
-    #[arg(long, value_name = "X", value_parser = range::ior)]
-    ior: Option<f64>,
-
-    /// Roughness of every dielectric, 0 to 1
-    #[arg(long, value_name = "X", value_parser = range::unit)]
-    roughness: Option<f64>,
-
-    /// Environment image in place of the scene's
-    #[arg(long, value_name = "FILE")]
-    env: Option<PathBuf>,
+    #[command(flatten)]
+    changes: Changes,
 }
 
 impl ExplainCommand {
     pub(super) fn run(self) -> Result<()> {
-        let overrides = Overrides { ior: self.ior, roughness: self.roughness, environment: self.env };
-        let scene = Scene::load(self.scene.as_deref(), &overrides)?;
+        let scene = Scene::load(self.scene.as_deref(), &self.changes.overrides())?;
         let options = RenderArgs { effects: self.effects, ..RenderArgs::default() }.or(scene.render.clone());
         let explanation = Explanation::new(&scene, &options)?;
         print(&if self.json { explanation.json() } else { explanation.to_string() })

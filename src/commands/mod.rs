@@ -9,12 +9,14 @@ mod render;
 
 use std::error::Error as _;
 use std::io::{IsTerminal, Write};
+use std::path::PathBuf;
 use std::process::ExitCode;
 
 use clap::error::ErrorKind;
 use clap::{ArgAction, Args, Parser, Subcommand};
 
-use crate::options::one_line;
+use crate::options::{one_line, range};
+use crate::scene::Overrides;
 use crate::{Error, Result};
 
 /// Renders glass, and shows what accuracy costs
@@ -44,6 +46,28 @@ enum Command {
     Numerics(numerics::NumericsCommand),
     /// Lists the Vulkan devices and what each can do
     Devices(devices::DevicesCommand),
+}
+
+/// What a command line puts in the place of what a scene says.
+#[derive(Debug, Args)]
+struct Changes {
+    /// Index of refraction of every dielectric
+    #[arg(long, value_name = "X", value_parser = range::ior)]
+    ior: Option<f64>,
+
+    /// Roughness of every dielectric, 0 to 1
+    #[arg(long, value_name = "X", value_parser = range::unit)]
+    roughness: Option<f64>,
+
+    /// Environment image in place of the scene's
+    #[arg(long, value_name = "FILE")]
+    env: Option<PathBuf>,
+}
+
+impl Changes {
+    fn overrides(&self) -> Overrides {
+        Overrides { ior: self.ior, roughness: self.roughness, environment: self.env.clone() }
+    }
 }
 
 /// How much is said beside results.
