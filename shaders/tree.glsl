@@ -36,6 +36,9 @@ const int TREE_STACK = 16;
 const float CUTOFF_STEP = 8.0;
 const float LEAST_CUTOFF = 1e-9;
 
+// Unless it took more rays than this: light that is guided in a wall and splits at every turn has a tree without end.
+const uint MOST_RAYS = 1 << 12;
+
 struct Branch {
     vec3 origin;
     vec3 direction;
@@ -179,6 +182,7 @@ void main()
     Chain chain = Chain(0, 0);
     uint headBefore = 0;        // of the chain when the tree began: there it begins once more
     uint interfacesBefore = 0;
+    uint raysBefore = 0;
 
     for (;;) {
         if (next == NEXT_PIXEL) {
@@ -200,6 +204,7 @@ void main()
             passed = 0;
             if (OPAQUE) GiveBack(chain, headBefore);
             interfaces = interfacesBefore;
+            raysBefore = rays;
             next = NEXT_BRANCH;
         }
         Found found;
@@ -342,7 +347,7 @@ void main()
 
         if (goesOn) continue;
         passed = 0;
-        if (gathered.faint > tolerance && cutoff > LEAST_CUTOFF) {
+        if (gathered.faint > tolerance && cutoff > LEAST_CUTOFF && rays - raysBefore <= MOST_RAYS) {
             cutoff /= CUTOFF_STEP;
             next = NEXT_TREE;
         } else if (top > 0) {

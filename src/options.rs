@@ -133,6 +133,13 @@ pub struct Size {
     pub height: u32,
 }
 
+impl Size {
+    /// How many there are.
+    pub fn pixels(self) -> f64 {
+        f64::from(self.width) * f64::from(self.height)
+    }
+}
+
 impl TryFrom<[u32; 2]> for Size {
     type Error = String;
 

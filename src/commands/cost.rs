@@ -1,7 +1,7 @@
 //! `vitrum cost`: error against time for the models, settings and effects that apply to a scene.
 
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -115,7 +115,9 @@ impl CostCommand {
             depth: self.max_depth.unwrap_or(REFERENCE_DEPTH),
             half: Duration::from_secs_f64(self.reference_time.unwrap_or(REFERENCE_SECONDS) / 2.0),
         };
+        let start = Instant::now();
         let cost = measurement.run(&mut |what, share| {
+            talk.detail(&format!("{:5.0} s  {what}", start.elapsed().as_secs_f64()));
             bar.set_position((share * 1000.0) as u64);
             bar.set_message(what.to_owned());
         })?;

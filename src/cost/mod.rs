@@ -7,7 +7,6 @@
 mod error;
 mod settings;
 
-use std::collections::HashMap;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -19,7 +18,7 @@ use xxhash_rust::xxh3::xxh3_64;
 use crate::compare::flip;
 use crate::effects::{Effect, Effects};
 use crate::gpu::Gpu;
-use crate::options::{Model, RenderArgs};
+use crate::options::{Model, RenderArgs, Size};
 use crate::passes::{self, Rendered};
 use crate::plan::Plan;
 use crate::scene::Scene;
@@ -35,8 +34,11 @@ const REFERENCE_TOLERANCE: f64 = 5e-3;
 const MOST_RUNS: usize = 3;
 const LONG: Duration = Duration::from_secs(3);
 
-/// A setting that would take longer, judged by the one before it, is left out.
+/// A setting that is expected to take longer is left out.
 const TOO_LONG_MS: f64 = 20e3;
+
+/// How much smaller, in each direction, the picture is that tells how long a setting takes.
+const PROBE: u32 = 4;
 
 /// The longest chain of interfaces of the reference, where the user has no wish: what is trapped for longer is faint.
 pub const REFERENCE_DEPTH: u32 = 1024;
@@ -113,6 +115,8 @@ pub struct Cost {
     pub reference: Reference,
     /// Each model and setting.
     pub entries: Vec<Measured>,
+    /// Settings that would have taken too long, and how many milliseconds that may have been.
+    pub left_out: Vec<(Setting, f64)>,
     /// Each effect that the scene calls for.
     pub effects: Vec<EffectCost>,
     /// The time that all of it took.
@@ -145,21 +149,41 @@ impl Measurement<'_> {
         let steps = (settings.len() + wanted.iter().count()) as f64;
         let done = |step: usize| 0.4 + 0.6 * step as f64 / steps;
         let mut entries: Vec<Measured> = Vec::new();
+        let mut left_out = Vec::new();
         for (step, setting) in settings.iter().enumerate() {
             progress(&setting.label(), done(step));
-            let before = entries.iter().rev().find(|entry| entry.setting.model == setting.model);
-            if before.is_none_or(|before| before.predicted(setting) < TOO_LONG_MS) {
+            let expected = self.expected_ms(setting, &entries)?;
+            if expected < TOO_LONG_MS {
                 entries.push(self.measure(setting, &reference)?);
+            } else {
+                left_out.push((setting.clone(), expected));
             }
         }
         mark_best(&mut entries);
         let mut effects = Vec::new();
-        let mut whole = HashMap::new();
         for (step, effect) in wanted.iter().enumerate() {
             progress(effect.name(), done(settings.len() + step));
-            effects.extend(self.effect(effect, wanted, &reference, &mut whole)?);
+            effects.extend(self.effect(effect, wanted, &reference, &entries)?);
         }
-        Ok(Cost { reference, entries, effects, taken: start.elapsed() })
+        Ok(Cost { reference, entries, left_out, effects, taken: start.elapsed() })
+    }
+
+    /// What `setting` may take, by one that differs in samples alone, or else by a small picture; 0 for models that are always quick.
+    fn expected_ms(&self, setting: &Setting, entries: &[Measured]) -> Result<f64> {
+        let is_alike = |entry: &&Measured| Setting { samples: setting.samples, ..entry.setting.clone() } == *setting;
+        let (ms, samples) = match entries.iter().rev().find(is_alike) {
+            Some(entry) => (entry.ms(), entry.setting.samples),
+            None if !setting.model.traces() => return Ok(0.0),
+            None => {
+                let plan = Plan::new(self.scene, &Setting { samples: 1, ..setting.clone() }.on(&self.options))?;
+                let small = |side: u32| side.div_ceil(PROBE);
+                let size = Size { width: small(plan.size.width), height: small(plan.size.height) };
+                let share = size.pixels() / plan.size.pixels();
+                let (ms, _) = self.render(&Plan { size, ..plan })?;
+                (ms / share, 1)
+            }
+        };
+        Ok(ms * f64::from(setting.samples) / f64::from(samples))
     }
 
     fn reference(&self, progress: &mut dyn FnMut(&str, f64)) -> Result<Reference> {
@@ -220,17 +244,23 @@ impl Measurement<'_> {
         Ok(Measured { setting: setting.clone(), plan, times, pipelines_ms, relmse, flip, rendered, is_best: false })
     }
 
+    /// A picture, and the milliseconds of it: of the device, or where that has no clock of the host, without set-up.
+    fn render(&self, plan: &Plan) -> Result<(f64, Rendered)> {
+        let begun = Instant::now();
+        let rendered = passes::render(self.gpu, self.scene, plan, &mut |_| {})?;
+        let device: Option<f64> = rendered.passes.iter().map(|pass| pass.gpu_ms).sum();
+        let host = begun.elapsed().saturating_sub(rendered.upload + rendered.pipelines);
+        Ok((device.unwrap_or(host.as_secs_f64() * 1e3), rendered))
+    }
+
     /// Renders until the time of it is known.
     fn timed(&self, plan: &Plan) -> Result<(Vec<f64>, f64, Rendered)> {
         let start = Instant::now();
         let mut times = Vec::new();
         let mut pipelines_ms = None;
         loop {
-            let begun = Instant::now();
-            let rendered = passes::render(self.gpu, self.scene, plan, &mut |_| {})?;
-            let device: Option<f64> = rendered.passes.iter().map(|pass| pass.gpu_ms).sum();
-            let host = begun.elapsed().saturating_sub(rendered.upload + rendered.pipelines);
-            times.push(device.unwrap_or(host.as_secs_f64() * 1e3));
+            let (ms, rendered) = self.render(plan)?;
+            times.push(ms);
             let pipelines_ms = *pipelines_ms.get_or_insert(rendered.pipelines.as_secs_f64() * 1e3);
             if times.len() == MOST_RUNS || start.elapsed() > LONG {
                 return Ok((times, pipelines_ms, rendered));
@@ -238,34 +268,35 @@ impl Measurement<'_> {
         }
     }
 
-    /// What `effect` costs and is worth, in the first model that simulates it as it is; `whole` keeps what models make of all that is
-    /// wanted.
+    /// What `effect` costs and is worth, in the first model that simulates it as it is and that `entries` have with all that is wanted.
     fn effect(
         &self,
         effect: Effect,
         wanted: Effects,
         reference: &Reference,
-        whole: &mut HashMap<&'static str, Share>,
+        entries: &[Measured],
     ) -> Result<Option<EffectCost>> {
-        let exact = |model: &Model| effect.honoured_by(*model) && !effect.approximated_by(*model, self.scene);
-        let simulates_all = |model: &Model| wanted.iter().all(|e| e.honoured_by(*model));
-        let Some(model) = [Model::Tree, Model::Path].into_iter().filter(simulates_all).find(exact) else {
+        let exact = |model: Model| effect.honoured_by(model) && !effect.approximated_by(model, self.scene);
+        let simulates_all = |model: Model| wanted.iter().all(|e| e.honoured_by(model));
+        let candidates = [Model::Tree, Model::Path].into_iter().filter(|&model| simulates_all(model) && exact(model));
+        let whole = |model: Model| {
+            let setting = Setting::of(model, settings::samples_of_effects(model));
+            entries.iter().find(|entry| entry.setting == setting)
+        };
+        let Some(with) = candidates.filter_map(whole).next() else {
             return Ok(None);
         };
-        let setting = Setting::of(model, settings::samples_of_effects(model));
-        let share = |effects: &str| -> Result<Share> {
-            let effects = Some(effects.parse().map_err(Error::Usage)?);
-            let plan = Plan::new(self.scene, &RenderArgs { effects, ..setting.on(&self.options) })?;
-            let (times, _, rendered) = self.timed(&plan)?;
-            Ok(Share { ms: median(&times), relmse: reference.relmse(&rendered.radiance) })
-        };
         let names = wanted.names().join(",");
-        let with = match whole.get(model.name()) {
-            Some(&with) => with,
-            None => *whole.entry(model.name()).or_insert(share(&names)?),
-        };
-        let without = share(&format!("{names},-{}", effect.name()))?;
-        Ok(Some(EffectCost { effect, model, samples: setting.samples, with, without }))
+        let effects = Some(format!("{names},-{}", effect.name()).parse().map_err(Error::Usage)?);
+        let plan = Plan::new(self.scene, &RenderArgs { effects, ..with.setting.on(&self.options) })?;
+        let (times, _, rendered) = self.timed(&plan)?;
+        Ok(Some(EffectCost {
+            effect,
+            model: with.setting.model,
+            samples: with.setting.samples,
+            with: Share { ms: with.ms(), relmse: with.relmse },
+            without: Share { ms: median(&times), relmse: reference.relmse(&rendered.radiance) },
+        }))
     }
 }
 
@@ -281,11 +312,6 @@ impl Measured {
     /// Median time of the runs, in milliseconds.
     pub fn ms(&self) -> f64 {
         median(&self.times)
-    }
-
-    /// What `other`, of the same model, may take.
-    fn predicted(&self, other: &Setting) -> f64 {
-        self.ms() * f64::from(other.samples) / f64::from(self.setting.samples)
     }
 }
 

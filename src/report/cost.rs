@@ -9,9 +9,12 @@ use super::cost_page;
 use super::stats::DeviceStats;
 use crate::cost::{Cost, EffectCost, Estimate, Measured, Measurement, Setting, TARGETS};
 use crate::gpu::DeviceInfo;
-use crate::image::{OutputFile, encode_png};
+use crate::image::{OutputFile, encode_png, make_folder};
 use crate::options::{MOST_SAMPLES, Model, Size};
 use crate::{Error, Result};
+
+/// The folder of the pictures, in that of the report.
+const PICTURES: &str = "pictures";
 
 /// Schema 1 of `cost.json`. What is not finite, or does not apply, is null.
 #[derive(Clone, Debug, Serialize)]
@@ -26,6 +29,7 @@ pub struct CostReport {
     pub seconds: f64,
     pub reference: ReferenceRow,
     pub entries: Vec<EntryRow>,
+    pub left_out: Vec<LeftOutRow>,
     pub targets: Vec<TargetRow>,
     pub effects: Vec<EffectRow>,
 }
@@ -64,6 +68,14 @@ pub struct EntryRow {
     pub unsupported: Vec<&'static str>,
     pub image: String,
     pub map: String,
+}
+
+/// A setting that was not rendered, and the time that it might have taken.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/cost.md describes the members")]
+pub struct LeftOutRow {
+    pub options: String,
+    pub expected_ms: f64,
 }
 
 /// The fastest setting that has at most this error.
@@ -112,9 +124,10 @@ impl CostReport {
                 noise: reference.noise,
                 max_depth: depth,
                 unseen: reference.unseen.clone(),
-                image: "reference.png".into(),
+                image: format!("{PICTURES}/reference.png"),
             },
             entries: cost.entries.iter().enumerate().map(EntryRow::new).collect(),
+            left_out: cost.left_out.iter().map(LeftOutRow::new).collect(),
             targets: TARGETS.map(|target| TargetRow::new(target, &cost.entries)).into(),
             effects: cost.effects.iter().map(EffectRow::new).collect(),
         }
@@ -128,6 +141,7 @@ impl CostReport {
 
     /// Writes `cost.json`, `index.html` and the pictures into `folder`.
     pub fn write(&self, folder: &Path, cost: &Cost) -> Result<()> {
+        make_folder(&folder.join(PICTURES), "is a file; the pictures of the report belong there: move it")?;
         let [width, height] = self.size;
         let png = |name: &str, pixels: &[[u8; 3]]| -> Result<()> {
             let file = OutputFile::new(&folder.join(name))?;
@@ -160,7 +174,11 @@ impl CostReport {
             let (label, ms, relmse, flip) = (&row.label, row.gpu_ms, error(row.relmse, row.relmse_error), row.flip);
             let _ = writeln!(text, "{best} {label:<34} {ms:>10.1} {relmse:>9}  {flip:>7.4}");
         }
-        text += "* nothing else is both faster and closer\n\n";
+        text += "* nothing else is both faster and closer\n";
+        for row in &self.left_out {
+            let _ = writeln!(text, "  left out: {}, about {:.0} s", row.options, row.expected_ms * 1e-3);
+        }
+        text += "\n";
         for target in &self.targets {
             let how = match (&target.options, target.gpu_ms) {
                 (Some(options), Some(ms)) if target.extrapolated => format!("{ms:.0} ms (not tried)  {options}"),
@@ -219,9 +237,15 @@ impl EntryRow {
             pareto: entry.is_best,
             approximate: entry.plan.approximate.names(),
             unsupported: entry.plan.unsupported.names(),
-            image: format!("{number:02}.png"),
-            map: format!("{number:02}-flip.png"),
+            image: format!("{PICTURES}/{number:02}.png"),
+            map: format!("{PICTURES}/{number:02}-flip.png"),
         }
+    }
+}
+
+impl LeftOutRow {
+    fn new((setting, expected_ms): &(Setting, f64)) -> Self {
+        Self { options: setting.options(), expected_ms: *expected_ms }
     }
 }
 

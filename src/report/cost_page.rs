@@ -77,6 +77,9 @@ pub(super) fn html(report: &CostReport) -> std::io::Result<String> {
         );
     }
     text += "</table>\n";
+    for row in &report.left_out {
+        let _ = writeln!(text, "<p>Left out: <code>{}</code>, about {:.0} s</p>", row.options, row.expected_ms * 1e-3);
+    }
     if !report.effects.is_empty() {
         text += "<h2>Effects</h2>\n<p>The same frame with an effect and without it: what it costs, and how far off the picture is. \
                  The noise of <code>path</code> is in both.</p>\n<table>\n<tr><th>effect</th><th>model</th><th class=\"n\">ms with</th><th class=\"n\">without</th>\
