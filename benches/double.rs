@@ -34,8 +34,8 @@ fn main() -> Result<(), Box<dyn Error>> {
     println!("| | relMSE of single | of double | ms a sample of single | of double | double over single |");
     println!("| --- | --- | --- | --- | --- | --- |");
     for (name, scene) in bodies()? {
-        let args = |model, samples| RenderArgs {
-            model: Some(model),
+        let args = |model: Model, samples| RenderArgs {
+            model: Some(model.into()),
             size: Some(SIZE),
             samples: Some(samples),
             ..RenderArgs::default()

@@ -53,7 +53,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             for _ in 0..ROUNDS {
                 for (effects, times) in ["auto", "all"].into_iter().zip(&mut times) {
                     let args = RenderArgs {
-                        model: Some(model),
+                        model: Some(model.into()),
                         size: Some(SIZE),
                         samples: Some(4),
                         effects: Some(effects.parse()?),

@@ -96,7 +96,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     for _ in 0..ROUNDS {
         for (i, scene) in scenes.iter().enumerate() {
             let args = RenderArgs {
-                model: Some(Model::Tree),
+                model: Some(Model::Tree.into()),
                 trace: Some(Trace::Software),
                 size: Some(SIZE),
                 samples: Some(1),

@@ -16,6 +16,7 @@
 #![deny(unsafe_code)]
 #![warn(missing_docs)]
 
+pub mod choice;
 pub mod commands;
 pub mod compare;
 pub mod cost;

@@ -5,6 +5,7 @@ use std::fmt::{self, Display};
 use std::path::PathBuf;
 use std::str::FromStr;
 
+use clap::builder::PossibleValue;
 use clap::{Args as _, FromArgMatches as _};
 
 use crate::effects::{Effect, Selection};
@@ -39,6 +40,53 @@ impl Model {
             Self::Double => "double",
             Self::Tree => "tree",
             Self::Path => "path",
+        }
+    }
+}
+
+/// What `--model` asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ModelChoice {
+    /// This one.
+    Only(Model),
+    /// Whichever is the cheapest for what is asked of the picture: see [`crate::choice`].
+    Auto,
+}
+
+impl ModelChoice {
+    /// The name on the command line.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Only(model) => model.name(),
+            Self::Auto => "auto",
+        }
+    }
+}
+
+impl From<Model> for ModelChoice {
+    fn from(model: Model) -> Self {
+        Self::Only(model)
+    }
+}
+
+impl clap::ValueEnum for ModelChoice {
+    fn value_variants<'a>() -> &'a [Self] {
+        const ALL: [ModelChoice; 5] = [
+            ModelChoice::Only(Model::Single),
+            ModelChoice::Only(Model::Double),
+            ModelChoice::Only(Model::Tree),
+            ModelChoice::Only(Model::Path),
+            ModelChoice::Auto,
+        ];
+        &ALL
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        match self {
+            Self::Only(model) => model.to_possible_value(),
+            Self::Auto => Some(PossibleValue::new("auto").help(
+                "The one that keeps --tolerance at the least cost, or is best within --time-budget, by small pictures of each",
+            )),
         }
     }
 }
@@ -198,7 +246,7 @@ ranges! {
 pub struct RenderArgs {
     /// Light transport model [default: single]
     #[arg(long, value_name = "NAME")]
-    pub model: Option<Model>,
+    pub model: Option<ModelChoice>,
 
     /// Size of the image in pixels [default: 1024x768]
     #[arg(long, value_name = "WxH")]
@@ -208,11 +256,11 @@ pub struct RenderArgs {
     #[arg(long, value_name = "N", value_parser = range::samples)]
     pub samples: Option<u32>,
 
-    /// Longest chain of interfaces; model single sees one [default: 32; tree with --tolerance: 1024]
+    /// Longest chain of interfaces; model single sees one [default: 32; tree and path with --tolerance: 1024]
     #[arg(long, value_name = "N", value_parser = range::max_depth)]
     pub max_depth: Option<u32>,
 
-    /// tree: no pixel discards more than X of the light, but for chains beyond --max-depth; path and double: samples until the mean relative error is below X
+    /// tree: no pixel discards more than X of the light, but for chains beyond --max-depth; path and double: samples until the mean relative error is below X, and that of 95 % of the pixels
     #[arg(long, value_name = "X", value_parser = range::positive)]
     pub tolerance: Option<f64>,
 

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use crate::effects::{Effect, Effects, SMOOTH};
-use crate::options::{Aov, DebugControls, MOST_SAMPLES, Model, RenderArgs, Size, Tonemap, Trace};
+use crate::options::{Aov, DebugControls, MOST_SAMPLES, Model, ModelChoice, RenderArgs, Size, Tonemap, Trace};
 use crate::scene::{Scene, Surface};
 use crate::{Error, Result};
 
@@ -22,8 +22,8 @@ pub struct Plan {
     pub max_depth: Option<u32>,
     /// Throughput below which a branch is cut off.
     pub cutoff: f64,
-    /// What a user tolerates: of `tree` the throughput that a pixel may lose so, of `path` and `double` the mean relative error of the
-    /// picture; infinite: anything.
+    /// What a user tolerates: of `tree` the throughput that a pixel may lose so, of `path` and `double` the relative error of the
+    /// picture, in the mean and of most pixels; infinite: anything.
     pub tolerance: f64,
     /// Whether environment and textures are averaged over a sample's share of its pixel, where rays are traced.
     pub footprints: bool,
@@ -106,7 +106,7 @@ const NORMALS_A_SAMPLE: RangeInclusive<u32> = 8..=16;
 pub const DEPTH: u32 = 32;
 
 /// The same where a tolerance is asked for: long enough that few pixels miss it, short enough to end.
-const DEPTH_OF_TOLERANCE: u32 = 1024;
+pub const DEPTH_OF_TOLERANCE: u32 = 1024;
 
 /// Throughput below which `tree` cuts a branch off, where no tolerance is asked for, and `double` ends a chain.
 const CUTOFF: f64 = 0.005;
@@ -136,6 +136,9 @@ fn unseen(scene: &Scene, model: Model, effects: Effects) -> Vec<&'static str> {
 }
 
 impl Plan {
+    /// The size of a picture, where the user has no wish.
+    pub const SIZE: Size = Size { width: 1024, height: 768 };
+
     /// Visible normals of a rough surface that each sample of a pixel takes: half as many where a chain of interfaces follows.
     pub fn normals(&self) -> u32 {
         let share = if self.model == Model::Double { 2 } else { 1 };
@@ -146,9 +149,18 @@ impl Plan {
         }
     }
 
+    /// How many effects, and kinds of light, the picture lacks or has by something simpler.
+    pub fn lacks(&self) -> usize {
+        self.unsupported.iter().count() + self.approximate.iter().count() + self.unseen.len()
+    }
+
     /// What `args` amount to for `scene`; the scene's own `[render]` table is not looked at, see [`RenderArgs::or`].
     pub fn new(scene: &Scene, args: &RenderArgs) -> Result<Self> {
-        let model = args.model.unwrap_or(Model::Single);
+        let model = match args.model {
+            Some(ModelChoice::Only(model)) => model,
+            Some(ModelChoice::Auto) => return Err(Error::Usage("--model auto: this needs a model by name".into())),
+            None => Model::Single,
+        };
         let has: &[Aov] = match model {
             Model::Single => &[Aov::Normal, Aov::Depth, Aov::Object],
             Model::Tree => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded],
@@ -172,7 +184,7 @@ impl Plan {
             let has = has.join(", ");
             return Err(Error::Usage(format!("--aov {name}: model {model} does not have it; it has: {has}")));
         }
-        let size = args.size.unwrap_or(Size { width: 1024, height: 768 });
+        let size = args.size.unwrap_or(Self::SIZE);
         let most = args.samples.unwrap_or(MOST_SAMPLES);
         let budget = match args.time_budget {
             Some(seconds) => Budget::Seconds { seconds, most },
@@ -184,7 +196,7 @@ impl Plan {
             }
         };
         let depth = match model {
-            Model::Tree if args.tolerance.is_some() => DEPTH_OF_TOLERANCE,
+            Model::Tree | Model::Path if args.tolerance.is_some() => DEPTH_OF_TOLERANCE,
             _ => DEPTH,
         };
         let max_depth = (model != Model::Single).then(|| args.max_depth.unwrap_or(depth));
@@ -222,7 +234,7 @@ impl Plan {
             checkpoint: args.checkpoint.clone(),
             debug: DebugControls::new(args),
             options: args.clone().or(RenderArgs {
-                model: Some(model),
+                model: Some(model.into()),
                 size: Some(size),
                 max_depth,
                 seed: Some(0),
@@ -244,8 +256,8 @@ mod tests {
 
     #[test]
     fn what_paths_cannot_meet_is_said() {
-        let unseen = |scene: &Scene, model| {
-            let args = RenderArgs { model: Some(model), ..RenderArgs::default() };
+        let unseen = |scene: &Scene, model: Model| {
+            let args = RenderArgs { model: Some(model.into()), ..RenderArgs::default() };
             Plan::new(scene, &args).expect("a plan").unseen
         };
         let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
@@ -263,7 +275,7 @@ mod tests {
         }
         assert!(unseen(&scene, Model::Path).is_empty(), "rough glass spreads light");
         let effects = Some("auto,-roughness".parse().expect("a selection"));
-        let args = RenderArgs { model: Some(Model::Path), effects, ..RenderArgs::default() };
+        let args = RenderArgs { model: Some(Model::Path.into()), effects, ..RenderArgs::default() };
         assert_eq!(Plan::new(&scene, &args).expect("a plan").unseen, [POINT_THROUGH_GLASS], "as if it were smooth");
     }
 }

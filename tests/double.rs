@@ -16,7 +16,7 @@ use vitrum::passes::Rendered;
 use vitrum::scene::{Dielectric, Overrides, PointLight, Scene, Surface, Surroundings};
 
 fn with(model: Model, width: u32, height: u32) -> RenderArgs {
-    RenderArgs { model: Some(model), ..sized(width, height) }
+    RenderArgs { model: Some(model.into()), ..sized(width, height) }
 }
 
 fn double(width: u32, height: u32) -> RenderArgs {

@@ -212,7 +212,7 @@ fn shipped() -> impl Iterator<Item = (String, Scene)> {
 
 fn picture(validated: &Validated, scene: &Scene, model: Model, effects: &str) -> Rendered {
     let args = RenderArgs {
-        model: Some(model),
+        model: Some(model.into()),
         size: Some(Size { width: 24, height: 18 }),
         samples: Some(2),
         max_depth: Some(8),

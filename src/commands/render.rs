@@ -7,9 +7,10 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
+use crate::choice::{Choice, choose, with_any_model};
 use crate::gpu::{DeviceInfo, Gpu, Instance};
 use crate::image::{FloatImage, ImageFormat, Layer, OutputFile, encode_exr, encode_png};
-use crate::options::{Aov, MOST_DEPTH, Model, RenderArgs};
+use crate::options::{Aov, MOST_DEPTH, Model, ModelChoice, RenderArgs};
 use crate::passes::{self, Rendered};
 use crate::plan::{Budget, Plan};
 use crate::report::{Run, Stats};
@@ -54,25 +55,35 @@ impl RenderCommand {
         let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
         let load = start.elapsed();
         let mut plan = self.plan(&scene, format)?;
-        let idle = idle_options(&self.options.clone().or(scene.render.clone()), plan.model, format);
         scene.frame(f64::from(plan.size.width) / f64::from(plan.size.height));
-        let options = &plan.options;
+        let options = plan.options.clone();
         let stats_file = options.stats.as_deref().map(OutputFile::new).transpose()?;
         let checkpoint = options.checkpoint.as_deref().map(OutputFile::new).transpose()?;
         let outputs =
             [("the image", Some(&output)), ("the stats", stats_file.as_ref()), ("the checkpoint", checkpoint.as_ref())];
-        self.keep_apart(outputs.into_iter().filter_map(|(what, file)| Some((what, file?))).collect(), options)?;
+        self.keep_apart(outputs.into_iter().filter_map(|(what, file)| Some((what, file?))).collect(), &options)?;
 
         let validation = options.validation == Some(true);
         let instance = Instance::new(validation)?;
         let gpu = Gpu::open(&instance, instance.choose(options.device.as_deref())?)?;
         passes::check(&gpu, &plan)?;
+        let asked = self.options.clone().or(scene.render.clone());
+        let choice = match asked.model {
+            Some(ModelChoice::Auto) => Some(choose(&gpu, &scene, &asked)?),
+            _ => None,
+        };
+        if let Some(choice) = &choice {
+            plan = Plan::new(&scene, &choice.best.args)?;
+        }
         let device = gpu.info().clone();
 
         for warning in &scene.warnings {
             talk.note(&format!("warning: {warning}"));
         }
-        for note in idle {
+        for note in choice.iter().flat_map(chosen) {
+            talk.note(&note);
+        }
+        for note in idle_options(&asked, plan.model, format) {
             talk.note(&note);
         }
         if plan.unsupported != Default::default() {
@@ -129,7 +140,7 @@ impl RenderCommand {
         drop((gpu, instance));
         let validation_messages = validation.then(|| messages.count());
         let run = Run { load, wall: start.elapsed(), peak_gpu_bytes, validation_messages };
-        let stats = Stats::new(&device, &scene, &plan, &rendered, run);
+        let stats = Stats::new(&device, &scene, &plan, &rendered, choice.as_ref(), run);
         if let Some(file) = &stats_file {
             file.write(stats.json().as_bytes())?;
         }
@@ -159,6 +170,11 @@ impl RenderCommand {
             }
             Ok(plan)
         };
+        // Which model it will be is not known yet: what no model takes is refused.
+        let plan = |options: &RenderArgs| match options.model {
+            Some(ModelChoice::Auto) => plan(&with_any_model(scene, options)?),
+            _ => plan(options),
+        };
         plan(&self.options.clone().or(scene.render.clone())).map_err(|error| match (plan(&self.options), &self.scene) {
             (Ok(_), Some(path)) => Error::input(path, 0, format!("[render]: {error}")),
             _ => error,
@@ -180,6 +196,27 @@ impl RenderCommand {
         }
         Ok(())
     }
+}
+
+/// What `--model auto` chose.
+fn chosen(choice: &Choice) -> Vec<String> {
+    let best = &choice.best;
+    let options = best.options();
+    let seconds = choice.taken.as_secs_f64();
+    if !choice.measured {
+        return vec![format!("note: --model auto: {options}, by the effects of the scene: there is no time to try")];
+    }
+    let (error, ms, samples) = (best.error, best.ms, best.samples);
+    let mut notes = vec![format!(
+        "note: --model auto: {options}; expected: {samples} samples in {:.2} s, 95 % of the pixels within {error:.1e} (found out in {seconds:.1} s)",
+        ms * 1e-3
+    )];
+    if let (Some(tolerance), false) = (choice.goal.tolerance, choice.is_expected) {
+        notes.push(format!(
+            "note: --model auto: nothing is expected to keep --tolerance {tolerance}; this comes closest"
+        ));
+    }
+    notes
 }
 
 /// Notes on options that are understood and change nothing here.
@@ -224,12 +261,12 @@ fn cut_off(plan: &Plan, stats: &Stats) -> Option<String> {
 
 /// That an image has a larger error than was asked for, in models that estimate it.
 fn too_rough(plan: &Plan, rendered: &Rendered) -> Option<String> {
-    let stderr = rendered.counts.as_ref()?.stderr.as_ref()?;
-    let error = passes::relative_error(&rendered.radiance, stderr);
-    let missed = plan.tolerance.is_finite() && error.is_nan() || error > plan.tolerance;
+    let (radiance, stderr) = (&rendered.radiance, rendered.counts.as_ref()?.stderr.as_ref()?);
+    let missed = plan.tolerance.is_finite() && !passes::is_within(radiance, stderr, plan.tolerance);
     missed.then(|| {
-        let (asked, samples) = (plan.tolerance, rendered.samples);
-        format!("note: --tolerance {asked}: the mean relative error is {error:.2e} after {samples} samples; more time or --samples lower it")
+        let (asked, samples, most) = (plan.tolerance, rendered.samples, passes::error_of_most(radiance, stderr));
+        let mean = passes::relative_error(radiance, stderr);
+        format!("note: --tolerance {asked}: after {samples} samples 95 % of the pixels are within {most:.2e}, and the mean relative error is {mean:.2e}; more time or --samples lower it")
     })
 }
 

@@ -197,7 +197,7 @@ impl Measurement<'_> {
             progress("reference", 0.2 * f64::from(number));
             let file = self.folder.join(format!("reference-{:016x}-{}.state", self.hash(), number + 1));
             let args = RenderArgs {
-                model: Some(Model::Path),
+                model: Some(Model::Path.into()),
                 seed: Some(self.options.seed.unwrap_or(0) ^ seed),
                 max_depth: Some(self.depth),
                 tolerance: Some(REFERENCE_TOLERANCE),
@@ -248,7 +248,7 @@ impl Measurement<'_> {
     fn render(&self, plan: &Plan) -> Result<(f64, Rendered)> {
         let begun = Instant::now();
         let rendered = passes::render(self.gpu, self.scene, plan, &mut |_| {})?;
-        let device: Option<f64> = rendered.passes.iter().map(|pass| pass.gpu_ms).sum();
+        let device = rendered.gpu_ms();
         let host = begun.elapsed().saturating_sub(rendered.upload + rendered.pipelines);
         Ok((device.unwrap_or(host.as_secs_f64() * 1e3), rendered))
     }

@@ -24,7 +24,7 @@ impl Setting {
     /// `options` with this.
     pub fn on(&self, options: &RenderArgs) -> RenderArgs {
         RenderArgs {
-            model: Some(self.model),
+            model: Some(self.model.into()),
             samples: Some(self.samples),
             max_depth: self.max_depth,
             tolerance: self.tolerance,

@@ -138,6 +138,12 @@ impl Commands {
         Ok(buffer)
     }
 
+    /// Puts `data` in the place of what `buffer` holds from its start on.
+    pub fn update_buffer<T: NoUninit>(&mut self, buffer: &Buffer, data: &[T]) -> Result<()> {
+        let staging = self.staging("data", bytemuck::cast_slice(data))?;
+        self.run(|cmd| cmd.copy_buffer(&staging, buffer)).map(|_| ())
+    }
+
     /// What `buffer` holds.
     pub fn read_buffer(&mut self, buffer: &Buffer) -> Result<Vec<u8>> {
         let desc = BufferDesc { name: "readback", size: buffer.size(), usage: BufferUse::Readback };

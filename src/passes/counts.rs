@@ -1,6 +1,9 @@
 //! What models count beside the light. In flow images as the device has them, out flows [`Counts`].
 
+use std::f64::consts::SQRT_2;
+
 use bytemuck::allocation::pod_collect_to_vec;
+use libm::erf;
 
 /// Means over the samples of each pixel, row 0 at the top.
 #[derive(Clone, Debug)]
@@ -47,17 +50,56 @@ impl Counts {
     }
 }
 
+/// What an error is relative to: the value, and as much that dark pixels do not count for all.
+pub const DARK: f64 = 0.1;
+
+/// The share of the pixels whose error a tolerance holds for.
+pub const MOST_PIXELS: f64 = 0.95;
+
 /// The mean over pixels and channels of standard error / (value + 0.1).
 pub fn relative_error(radiance: &[[f32; 3]], stderr: &[[f32; 3]]) -> f64 {
-    let pairs = radiance.iter().flatten().zip(stderr.iter().flatten());
-    let errors: f64 = pairs.map(|(&value, &error)| f64::from(error) / (f64::from(value) + 0.1)).sum();
+    let errors: f64 = relative_errors(radiance, stderr).sum();
     errors / (3 * radiance.len()) as f64
 }
 
-/// The same of images as the device has them.
-pub(super) fn relative_error_of(mean: &[u8], spread: &[u8]) -> f64 {
+/// The error / (value + 0.1) that [`MOST_PIXELS`], each channel for itself, are expected to be within: their errors are as if drawn
+/// from normal distributions of these standard errors.
+pub fn error_of_most(radiance: &[[f32; 3]], stderr: &[[f32; 3]]) -> f64 {
+    let errors: Vec<_> = relative_errors(radiance, stderr).collect();
+    if errors.iter().any(|error| !error.is_finite()) {
+        return f64::INFINITY;
+    }
+    let most = errors.iter().copied().fold(0.0, f64::max);
+    // Within twice the largest are more than enough.
+    let (mut low, mut high) = (0.0, 2.0 * most);
+    for _ in 0..40 {
+        let middle = 0.5 * (low + high);
+        if share_within(&errors, middle) < MOST_PIXELS { low = middle } else { high = middle }
+    }
+    high
+}
+
+/// Whether a picture keeps a tolerance: [`relative_error`] is below it, and the error of [`MOST_PIXELS`].
+pub fn is_within(radiance: &[[f32; 3]], stderr: &[[f32; 3]], tolerance: f64) -> bool {
+    let errors: Vec<_> = relative_errors(radiance, stderr).collect();
+    relative_error(radiance, stderr) < tolerance && share_within(&errors, tolerance) >= MOST_PIXELS
+}
+
+/// The share of normally distributed errors, of these standard deviations, that are expected to be within `bound`.
+fn share_within(deviations: &[f64], bound: f64) -> f64 {
+    let share = |&deviation: &f64| if deviation > 0.0 { erf(bound / (deviation * SQRT_2)) } else { 1.0 };
+    deviations.iter().map(share).sum::<f64>() / deviations.len() as f64
+}
+
+fn relative_errors(radiance: &[[f32; 3]], stderr: &[[f32; 3]]) -> impl Iterator<Item = f64> {
+    let pairs = radiance.iter().flatten().zip(stderr.iter().flatten());
+    pairs.map(|(&value, &error)| f64::from(error) / (f64::from(value) + DARK))
+}
+
+/// [`is_within`] of images as the device has them.
+pub(super) fn is_within_of(mean: &[u8], spread: &[u8], tolerance: f64) -> bool {
     let radiance: Vec<_> = texels(mean).into_iter().map(|[r, g, b, _]| [r, g, b]).collect();
-    relative_error(&radiance, &errors(spread))
+    is_within(&radiance, &errors(spread), tolerance)
 }
 
 /// Standard errors of all pixels.
@@ -87,6 +129,20 @@ fn texels(bytes: &[u8]) -> Vec<[f32; 4]> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_tolerance_holds_for_most_pixels() {
+        // Of one deviation 95 % are within 1.96 of it.
+        let (ones, tenths) = (vec![[0.9; 3]; 100], vec![[0.1; 3]; 100]);
+        assert!((error_of_most(&ones, &tenths) - 0.196).abs() < 1e-4);
+        assert!((relative_error(&ones, &tenths) - 0.1).abs() < 1e-6);
+        assert!(is_within(&ones, &tenths, 0.197) && !is_within(&ones, &tenths, 0.195));
+        // Few pixels may be as wrong as they like, but for the mean.
+        let few = |error| (0..100).map(|i| [if i < 4 { error } else { 0.0 }; 3]).collect::<Vec<_>>();
+        assert!(is_within(&ones, &few(1.0), 0.05) && !is_within(&ones, &few(1.0), 0.03));
+        assert!(error_of_most(&ones, &few(f32::INFINITY)) == f64::INFINITY);
+        assert!(!is_within(&ones, &few(f32::NAN), 0.1), "what is not known");
+    }
 
     #[test]
     fn the_standard_error_is_that_of_a_textbook() {

@@ -49,9 +49,9 @@ use tree::{Tree, TreeTargets};
 
 pub use aov::Aovs;
 pub use checkpoint::is_checkpoint;
-pub use counts::{Counts, relative_error};
+pub use counts::{Counts, DARK, MOST_PIXELS, error_of_most, is_within, relative_error};
 pub use probe::{Hit, Leaks, Ray, TraceProbe};
-pub use sampling::pixel_offsets;
+pub use sampling::{OPEN_BATCH, pixel_offsets};
 
 /// Radiance in flight, and means of it.
 const RADIANCE: Format = Format::Rgba32Float;
@@ -85,6 +85,13 @@ pub struct Rendered {
     pub warnings: Vec<String>,
 }
 
+impl Rendered {
+    /// Milliseconds of all passes on the device, if it has a clock.
+    pub fn gpu_ms(&self) -> Option<f64> {
+        self.passes.iter().map(|pass| pass.gpu_ms).sum()
+    }
+}
+
 /// Whether `gpu` can do what `plan` says.
 pub fn check(gpu: &Gpu, plan: &Plan) -> Result<()> {
     let limit = gpu.max_image_side();
@@ -113,51 +120,79 @@ fn trace_of(gpu: &Gpu, plan: &Plan) -> Result<Option<Trace>> {
 
 /// Renders `scene` as `plan` says. `progress` hears how many samples are done.
 pub fn render(gpu: &Gpu, scene: &Scene, plan: &Plan, progress: &mut dyn FnMut(u32)) -> crate::Result<Rendered> {
-    let start = Instant::now();
-    check(gpu, plan)?;
-    let mut commands = Commands::new(gpu)?;
-    let trace = trace_of(gpu, plan)?;
-    let resources = Resources::new(&mut commands, scene, plan, trace)?;
-    let upload = start.elapsed();
+    Renderer::new(gpu, scene, plan)?.render(plan, progress)
+}
 
-    let mut passes = Passes::new(&mut commands, &resources, plan, trace)?;
-    let set_up = start.elapsed();
+/// A scene on a device and the passes of a model, ready to be rendered any number of times.
+pub struct Renderer {
+    commands: Commands,
+    resources: Resources,
+    passes: Passes,
+    trace: Option<Trace>,
+    upload: Duration,
+    set_up: Duration,
+}
 
-    let targets = Targets::new(gpu, plan.size, &resources, plan.model)?;
-    let checkpoint = match &plan.checkpoint {
-        Some(path) => Some(Checkpoint::new(path, checkpoint::key(gpu, plan, trace, resources.fingerprint))?),
-        None => None,
-    };
-    let is_spent = |rounds| is_spent(plan.budget, set_up, start.elapsed(), rounds);
-    let job = Job { plan, resources: &resources, targets: &targets, is_spent: &is_spent };
-    let Sampled { mut times, samples, resumed, warnings } =
-        passes.all_samples(&mut commands, &job, checkpoint, progress)?;
-
-    let (display, time) = passes.display.run(&mut commands, &targets, plan)?;
-    times.add(time);
-    let mean = commands.read_image(&targets.mean)?;
-    let radiance = radiance(&mean)?;
-    let counts = targets.counts(&mut commands, &mean, samples)?;
-    let mut aovs = None;
-    if let Some(pass) = &passes.aov {
-        let (values, time) = pass.run(&mut commands, &resources, &resources.draws, plan.size)?;
-        times.add(time);
-        aovs = Some(values);
+impl Renderer {
+    /// Puts `scene` on the device and makes the passes that `plan` asks for.
+    pub fn new(gpu: &Gpu, scene: &Scene, plan: &Plan) -> crate::Result<Self> {
+        let start = Instant::now();
+        check(gpu, plan)?;
+        let mut commands = Commands::new(gpu)?;
+        let trace = trace_of(gpu, plan)?;
+        let resources = Resources::new(&mut commands, scene, plan, trace)?;
+        let upload = start.elapsed();
+        let passes = Passes::new(&mut commands, &resources, plan, trace)?;
+        Ok(Self { commands, resources, passes, trace, upload, set_up: start.elapsed() })
     }
-    Ok(Rendered {
-        radiance,
-        display,
-        aovs,
-        counts,
-        trace,
-        samples,
-        passes: times.0,
-        upload,
-        acceleration: resources.acceleration,
-        pipelines: set_up - upload,
-        resumed,
-        warnings,
-    })
+
+    /// The next render goes by `plan`, which differs from the one before in samples, seed, depth, cut-off and tolerance alone.
+    pub fn set_limits(&mut self, plan: &Plan) -> Result<()> {
+        self.resources.set_limits(&mut self.commands, plan)
+    }
+
+    /// Renders, as the plan says that this was made for, or that was set since. `progress` hears how many samples are done.
+    pub fn render(&mut self, plan: &Plan, progress: &mut dyn FnMut(u32)) -> crate::Result<Rendered> {
+        let start = Instant::now();
+        let Self { commands, resources, passes, trace, .. } = self;
+        let (trace, set_up) = (*trace, self.set_up);
+        let gpu = commands.gpu().clone();
+        let targets = Targets::new(&gpu, plan.size, resources, plan.model)?;
+        let checkpoint = match &plan.checkpoint {
+            Some(path) => Some(Checkpoint::new(path, checkpoint::key(&gpu, plan, trace, resources.fingerprint))?),
+            None => None,
+        };
+        let is_spent = |rounds| is_spent(plan.budget, set_up, set_up + start.elapsed(), rounds);
+        let job = Job { plan, resources, targets: &targets, is_spent: &is_spent };
+        let Sampled { mut times, samples, resumed, warnings } =
+            passes.all_samples(commands, &job, checkpoint, progress)?;
+
+        let (display, time) = passes.display.run(commands, &targets, plan)?;
+        times.add(time);
+        let mean = commands.read_image(&targets.mean)?;
+        let radiance = radiance(&mean)?;
+        let counts = targets.counts(commands, &mean, samples)?;
+        let mut aovs = None;
+        if let Some(pass) = &passes.aov {
+            let (values, time) = pass.run(commands, resources, &resources.draws, plan.size)?;
+            times.add(time);
+            aovs = Some(values);
+        }
+        Ok(Rendered {
+            radiance,
+            display,
+            aovs,
+            counts,
+            trace,
+            samples,
+            passes: times.0,
+            upload: self.upload,
+            acceleration: self.resources.acceleration,
+            pipelines: set_up - self.upload,
+            resumed,
+            warnings,
+        })
+    }
 }
 
 /// The passes of a sample, in their order, and those that end the frame.
@@ -427,7 +462,7 @@ fn is_precise(commands: &mut Commands, targets: &Targets, plan: &Plan, rounds: u
         return Ok(false);
     }
     let (mean, spread) = (commands.read_image(&targets.mean)?, commands.read_image(spread)?);
-    Ok(counts::relative_error_of(&mean, &spread) < plan.tolerance)
+    Ok(counts::is_within_of(&mean, &spread, plan.tolerance))
 }
 
 /// Whether another round like those before would end after the time.

@@ -114,7 +114,7 @@ impl TraceProbe {
     ///
     /// If the device has no ray queries for [`Trace::Hardware`], or the scene does not fit.
     pub fn new(gpu: &Gpu, scene: &Scene, trace: Trace) -> crate::Result<Self> {
-        let args = RenderArgs { model: Some(Model::Tree), trace: Some(trace), ..RenderArgs::default() };
+        let args = RenderArgs { model: Some(Model::Tree.into()), trace: Some(trace), ..RenderArgs::default() };
         let plan = Plan::new(scene, &args)?;
         super::check(gpu, &plan)?;
         let mut commands = Commands::new(gpu)?;

@@ -16,8 +16,8 @@ use super::skylight;
 use super::view::View;
 use crate::effects::Effect;
 use crate::gpu::{
-    AccelerationStructure, Bind, BindGroup, Commands, Format, Frame, Gpu, GpuError, Image, ImageDesc, LightRecord,
-    MaterialRecord, Result, Specialization, Use,
+    AccelerationStructure, Bind, BindGroup, Buffer, Commands, Format, Frame, Gpu, GpuError, Image, ImageDesc,
+    LightRecord, MaterialRecord, Result, Specialization, Use,
 };
 use crate::options::{Model, Trace};
 use crate::plan::{Budget, Estimator, Plan};
@@ -54,6 +54,7 @@ pub(super) struct Resources {
     pub(super) opaque: bool,
     /// Host time that hierarchies took, if there are any.
     pub(super) acceleration: Option<Duration>,
+    frame: (Frame, Arc<Buffer>),
     /// A number that tells all of this from other scenes, if the plan has a use for it.
     pub(super) fingerprint: Option<u128>,
 }
@@ -134,8 +135,9 @@ impl Resources {
         let texels = if plan.effects.contains(Effect::Textures) { texels(&scene.textures) } else { Vec::new() };
         upload.hash(&[paths_frame(frame)]);
         upload.commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
+        let frame_buffer = Arc::new(upload.commands.upload_buffer("frame", &[frame])?);
         let mut bindings = vec![
-            Bind::Buffer(Arc::new(upload.commands.upload_buffer("frame", &[frame])?)),
+            Bind::Buffer(frame_buffer.clone()),
             upload.buffer("instances", &geometry.instances)?,
             upload.buffer("materials", &materials)?,
             upload.buffer("lights", &lights)?,
@@ -199,8 +201,16 @@ impl Resources {
             metres_per_unit: 1.0 / view.units_per_metre,
             opaque,
             acceleration: trace.map(|_| acceleration),
+            frame: (frame, frame_buffer),
             fingerprint,
         })
+    }
+
+    /// Puts the seed of `plan`, and what limits its samples, in the place of those before.
+    pub(super) fn set_limits(&mut self, commands: &mut Commands, plan: &Plan) -> Result<()> {
+        let (frame, buffer) = &mut self.frame;
+        *frame = limited(*frame, plan);
+        commands.update_buffer(buffer, &[*frame])
     }
 }
 
@@ -255,6 +265,13 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         transmission_green: plan.debug.transmission_green,
         transmission_intensity: plan.debug.transmission_intensity,
         flipped_ratio: plan.debug.flipped_ratio.into(),
+        ..limited(Frame::default(), plan)
+    }
+}
+
+/// `frame` with the seed of `plan`, and what limits its samples.
+fn limited(frame: Frame, plan: &Plan) -> Frame {
+    Frame {
         seed: (plan.seed ^ (plan.seed >> 32)) as u32,
         normals: plan.normals(),
         normals_in_all: match plan.budget {
@@ -264,7 +281,7 @@ fn frame(scene: &Scene, plan: &Plan, view: &View, light_count: u32) -> Frame {
         max_depth: plan.max_depth.unwrap_or(1),
         cutoff: plan.cutoff as f32,
         tolerance: plan.tolerance as f32,
-        ..Frame::default()
+        ..frame
     }
 }
 

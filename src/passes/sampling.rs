@@ -55,8 +55,8 @@ pub(super) fn rounds(plan: &Plan) -> Box<dyn Iterator<Item = Round>> {
 /// Batches that the means of a pixel's samples should come from: what tells their standard error within a few per cent.
 const BATCHES: u32 = 16;
 
-/// Samples of a batch where it is not known how many there will be.
-const OPEN_BATCH: u32 = 4;
+/// Samples of a batch of `path` where it is not known how many there will be: it takes a multiple of them.
+pub const OPEN_BATCH: u32 = 4;
 
 /// Batches of samples that are as independent of each other as random ones: each pixel's samples fill its square and whatever else they
 /// choose from evenly within a batch, so that the means of batches tell how far off theirs is. All of one size, a power of two.

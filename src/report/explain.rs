@@ -5,11 +5,13 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::stats::{CandidateRow, Outcome};
 use crate::Result;
+use crate::choice::Choice;
 use crate::effects::{Caller, Effect};
-use crate::options::{Model, RenderArgs};
+use crate::options::{Model, RenderArgs, Size};
 use crate::plan::Plan;
-use crate::scene::{MeshFaults, Object, Scene, Surroundings};
+use crate::scene::{MeshFaults, Object, Scene, Surroundings, Touch};
 
 /// Callers of an effect that are told one by one.
 const MOST_CALLERS: usize = 5;
@@ -30,7 +32,22 @@ pub struct Explanation {
     pub effects: Vec<EffectRow>,
     pub models: Vec<ModelRow>,
     pub meshes: Vec<MeshRow>,
+    pub touching: Vec<TouchRow>,
     pub warnings: Vec<String>,
+    pub plan: Option<PlanRow>,
+}
+
+/// What `--model auto` would render, on a device.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/explain.md describes the members")]
+pub struct PlanRow {
+    pub device: String,
+    pub size: [u32; 2],
+    pub tolerance: Option<f64>,
+    pub time_budget: Option<f64>,
+    pub is_expected: bool,
+    pub best: CandidateRow,
+    pub others: Vec<CandidateRow>,
 }
 
 /// How much there is of what.
@@ -103,12 +120,21 @@ pub struct MeshRow {
     pub faults: MeshFaults,
 }
 
+/// Two objects with walls at one place, or one with itself.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/explain.md describes the members")]
+pub struct TouchRow {
+    pub objects: [usize; 2],
+    pub triangles: usize,
+}
+
 impl Explanation {
     /// Of `scene`, rendered with `options`.
     pub fn new(scene: &Scene, options: &RenderArgs) -> Result<Self> {
-        let plan = |model| {
+        let plan = |model: Model| {
             // Options that some models refuse have no part in what is told.
-            let options = RenderArgs { model: Some(model), effects: options.effects.clone(), ..RenderArgs::default() };
+            let options =
+                RenderArgs { model: Some(model.into()), effects: options.effects.clone(), ..RenderArgs::default() };
             Plan::new(scene, &options)
         };
         let plans = Model::ALL.into_iter().map(plan).collect::<Result<Vec<_>>>()?;
@@ -131,14 +157,67 @@ impl Explanation {
             effects: Effect::all().map(row).collect(),
             models: plans.iter().map(ModelRow::new).collect(),
             meshes: (0..scene.meshes.len()).map(|mesh| MeshRow::new(scene, mesh)).collect(),
+            touching: scene.touching().iter().map(|touch| TouchRow::new(touch, scene)).collect(),
             warnings: scene.warnings.clone(),
+            plan: None,
         })
+    }
+
+    /// The same with what `choice` found for a picture of `size` on a device.
+    #[must_use]
+    pub fn with_plan(self, device: &str, size: Size, choice: &Choice) -> Self {
+        let plan = PlanRow {
+            device: device.into(),
+            size: [size.width, size.height],
+            tolerance: choice.goal.tolerance,
+            time_budget: choice.goal.seconds,
+            is_expected: choice.is_expected,
+            best: CandidateRow::new(&choice.best),
+            others: choice.others.iter().map(CandidateRow::new).collect(),
+        };
+        Self { plan: Some(plan), ..self }
     }
 
     /// One object, readable and ended by a newline.
     pub fn json(&self) -> String {
         // Plain numbers, strings and lists: nothing that could fail.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
+    }
+}
+
+impl PlanRow {
+    /// What is asked for, in words.
+    fn goal(&self) -> String {
+        let asked = [
+            self.tolerance.map(|x| format!("--tolerance {x}")),
+            self.time_budget.map(|x| format!("--time-budget {x}")),
+        ];
+        asked.into_iter().flatten().collect::<Vec<_>>().join(" ")
+    }
+}
+
+impl fmt::Display for PlanRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let [width, height] = self.size;
+        writeln!(f, "\nPlan for {}, {width}x{height} on {}", self.goal(), self.device)?;
+        for (i, row) in [&self.best].into_iter().chain(&self.others).enumerate() {
+            let Outcome { samples, gpu_ms, error } = row.expected;
+            let expected = match (gpu_ms, error) {
+                (Some(ms), Some(error)) => {
+                    format!(
+                        "{:.2} s, {}, 95 % of the pixels within {error:.1e}",
+                        ms * 1e-3,
+                        counted(samples as usize, "sample")
+                    )
+                }
+                _ => "by the effects of the scene: there is no time to try".into(),
+            };
+            writeln!(f, "{} {:<48} {expected}", if i == 0 { '*' } else { ' ' }, row.options)?;
+        }
+        if !self.is_expected {
+            writeln!(f, "  nothing is expected to keep that; the first comes closest")?;
+        }
+        Ok(())
     }
 }
 
@@ -237,6 +316,25 @@ impl MeshRow {
             objects: numbers(scene, |object| object.mesh == number),
             closed: mesh.faults.is_closed(),
             faults: mesh.faults,
+        }
+    }
+}
+
+impl TouchRow {
+    fn new(touch: &Touch, scene: &Scene) -> Self {
+        Self { objects: touch.objects.map(|object| number(scene, object)), triangles: touch.triangles }
+    }
+}
+
+impl fmt::Display for TouchRow {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let ([a, b], triangles) = (self.objects, counted(self.triangles, "triangle"));
+        match a == b {
+            true => write!(f, "object {a}: {triangles} on others of it; keep them apart"),
+            false => write!(
+                f,
+                "objects {a} and {b}: {triangles} of one on the other; overlap them and set priority, or part them"
+            ),
         }
     }
 }
@@ -341,20 +439,27 @@ impl fmt::Display for Explanation {
         if meshes.len() > MOST_NAMED {
             writeln!(f, "  and {} more", meshes.len() - MOST_NAMED)?;
         }
+        for (i, touch) in self.touching.iter().enumerate() {
+            let title = if i == 0 { "\nWalls at one place\n" } else { "" };
+            writeln!(f, "{title}  {touch}")?;
+        }
         for (i, warning) in self.warnings.iter().enumerate() {
             let title = if i == 0 { "\nWarnings\n" } else { "" };
             writeln!(f, "{title}  {warning}")?;
         }
-        Ok(())
+        self.plan.iter().try_for_each(|plan| plan.fmt(f))
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use std::time::Duration;
+
     use glam::DVec3;
     use serde_json::Value;
 
     use super::*;
+    use crate::choice::{Candidate, Goal};
     use crate::scene::{Overrides, PointLight};
 
     /// Four bodies of one glass; the first and the third may overlap.
@@ -459,7 +564,7 @@ mod tests {
         scene.meshes[9].faults.open_edges = 2;
         let text = explained(&scene, "auto").to_string();
         assert!(text.contains("\nMeshes\n  teapot_body.obj: 25582 triangles; 2 open edges\n"), "{text}");
-        assert!(text.ends_with("no faults\n  and 2 more\n"), "{text}");
+        assert!(text.contains("no faults\n  and 2 more\n"), "{text}");
     }
 
     /// Where `value` has members: `scene.name`, `effects[].name`.
@@ -482,8 +587,20 @@ mod tests {
         let mut scene = lit(1);
         scene.meshes[0].overlaps = true;
         scene.camera.position = scene.bounds_of(&scene.objects[0]).center();
-        let json: Value = serde_json::from_str(&explained(&scene, "auto").json()).expect("JSON");
-        assert_eq!((&json["schema"], &json["scene"]["objects"]), (&1.into(), &4.into()));
+        // A body once more at its own place.
+        scene.objects.push(scene.objects[2].clone());
+        let args = RenderArgs::default();
+        let best = Candidate { args, model: Model::Tree, samples: 4, ms: 10.0, error: 0.04 };
+        let goal = Goal { tolerance: Some(0.05), seconds: Some(1.0) };
+        let others = vec![Candidate { samples: 9, ..best.clone() }];
+        let choice = Choice { goal, best, others, is_expected: true, measured: true, taken: Duration::ZERO };
+        let explanation = explained(&scene, "auto").with_plan("a device", Size { width: 4, height: 3 }, &choice);
+        let json: Value = serde_json::from_str(&explanation.json()).expect("JSON");
+        assert_eq!(
+            (&json["schema"], &json["scene"]["objects"]),
+            (&1.into(), &4.into()),
+            "an object counts by its number"
+        );
         assert_eq!(json["effects"][0]["models"]["single"], "simulates");
         assert_eq!(json["effects"][2]["models"]["single"], "leaves-out");
         let mut found = BTreeSet::new();

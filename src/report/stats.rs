@@ -4,9 +4,10 @@ use std::time::Duration;
 
 use serde::Serialize;
 
+use crate::choice::{Candidate, Choice};
 use crate::gpu::{DeviceInfo, PassTime};
 use crate::options::Trace;
-use crate::passes::Rendered;
+use crate::passes::{self, Rendered};
 use crate::plan::Plan;
 use crate::scene::Scene;
 
@@ -38,6 +39,74 @@ pub struct Stats {
     pub stderr: Option<StderrStats>,
     pub non_finite_pixels: usize,
     pub validation_messages: Option<usize>,
+    pub auto: Option<AutoStats>,
+}
+
+/// What `--model auto` expected, and what came of it.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/auto.md describes the members")]
+pub struct AutoStats {
+    pub tolerance: Option<f64>,
+    pub time_budget: Option<f64>,
+    pub options: String,
+    pub expected: Option<Outcome>,
+    pub found: Outcome,
+    pub others: Vec<CandidateRow>,
+    pub pilots_ms: f64,
+}
+
+/// What a render takes, and the error that 95 % of its pixels keep.
+#[derive(Clone, Copy, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/auto.md describes the members")]
+pub struct Outcome {
+    pub samples: u32,
+    pub gpu_ms: Option<f64>,
+    pub error: Option<f64>,
+}
+
+/// What else could have been done.
+#[derive(Clone, Debug, Serialize)]
+#[allow(missing_docs, reason = "docs/auto.md describes the members")]
+pub struct CandidateRow {
+    pub options: String,
+    #[serde(flatten)]
+    pub expected: Outcome,
+}
+
+impl CandidateRow {
+    /// That of one candidate.
+    pub fn new(candidate: &Candidate) -> Self {
+        Self { options: candidate.options(), expected: Outcome::expected(candidate) }
+    }
+}
+
+impl Outcome {
+    fn expected(candidate: &Candidate) -> Self {
+        let known = |value: f64| value.is_finite().then_some(value);
+        Self { samples: candidate.samples, gpu_ms: known(candidate.ms), error: known(candidate.error) }
+    }
+
+    /// The error where the samples of a model tell it, and it has no other.
+    fn found(plan: &Plan, rendered: &Rendered) -> Self {
+        let stderr = rendered.counts.as_ref().and_then(|counts| counts.stderr.as_deref());
+        let stderr = stderr.filter(|_| plan.lacks() == 0);
+        let error = stderr.map(|stderr| passes::error_of_most(&rendered.radiance, stderr));
+        Self { samples: rendered.samples, gpu_ms: rendered.gpu_ms(), error: error.filter(|error| error.is_finite()) }
+    }
+}
+
+impl AutoStats {
+    fn new(choice: &Choice, plan: &Plan, rendered: &Rendered) -> Self {
+        Self {
+            tolerance: choice.goal.tolerance,
+            time_budget: choice.goal.seconds,
+            options: choice.best.options(),
+            expected: choice.measured.then(|| Outcome::expected(&choice.best)),
+            found: Outcome::found(plan, rendered),
+            others: choice.others.iter().map(CandidateRow::new).collect(),
+            pilots_ms: ms(choice.taken),
+        }
+    }
 }
 
 /// Which device it was.
@@ -126,7 +195,14 @@ pub struct Run {
 
 impl Stats {
     /// Those of one render.
-    pub fn new(device: &DeviceInfo, scene: &Scene, plan: &Plan, rendered: &Rendered, run: Run) -> Self {
+    pub fn new(
+        device: &DeviceInfo,
+        scene: &Scene,
+        plan: &Plan,
+        rendered: &Rendered,
+        choice: Option<&Choice>,
+        run: Run,
+    ) -> Self {
         let passes: Vec<_> =
             rendered.passes.iter().map(|&PassTime { name, gpu_ms }| PassStats { name, gpu_ms }).collect();
         let counts = rendered.counts.as_ref();
@@ -146,7 +222,7 @@ impl Stats {
             approximate: plan.approximate.names(),
             unseen: plan.unseen.clone(),
             trace: rendered.trace.map_or("none", Trace::name),
-            gpu_ms: passes.iter().map(|pass| pass.gpu_ms).sum(),
+            gpu_ms: rendered.gpu_ms(),
             passes,
             build_ms: BuildTimes {
                 scene: ms(run.load + rendered.upload),
@@ -160,6 +236,7 @@ impl Stats {
             stderr: counts.and_then(|counts| counts.stderr.as_deref()).and_then(StderrStats::new),
             non_finite_pixels: rendered.radiance.len() - rendered.radiance.iter().filter(finite).count(),
             validation_messages: run.validation_messages,
+            auto: choice.map(|choice| AutoStats::new(choice, plan, rendered)),
         }
     }
 

@@ -20,6 +20,7 @@ mod obj_text;
 mod table;
 mod texture;
 mod topology;
+mod touching;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -33,6 +34,7 @@ pub(crate) use files::Files;
 pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
 pub use mesh::{Mesh, MeshFaults, RawMesh, Refusal};
 pub use texture::{Texels, Texture};
+pub use touching::Touch;
 
 use crate::options::RenderArgs;
 use crate::{Error, Result};

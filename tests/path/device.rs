@@ -43,7 +43,7 @@ fn wide(pixels: &[[f32; 3]]) -> Vec<DVec3> {
 
 pub fn picture(validated: &Validated, scene: &Scene, shot: Shot) -> Picture {
     let args = RenderArgs {
-        model: Some(Model::Path),
+        model: Some(Model::Path.into()),
         size: Some(shot.size),
         samples: Some(shot.samples),
         max_depth: Some(shot.depth),
@@ -68,7 +68,7 @@ pub fn picture(validated: &Validated, scene: &Scene, shot: Shot) -> Picture {
 /// The same of the model `tree`, its throughput followed down to next to nothing.
 pub fn tree(validated: &Validated, scene: &Scene, seed: u64, samples: u32, depth: u32) -> Vec<DVec3> {
     let args = RenderArgs {
-        model: Some(Model::Tree),
+        model: Some(Model::Tree.into()),
         size: Some(SIZE),
         samples: Some(samples),
         max_depth: Some(depth),

@@ -77,7 +77,7 @@ fn everything_is_read() {
     assert_eq!(scene.camera.position, DVec3::new(0.0, 0.25, 0.9));
     assert_eq!((scene.camera.target, scene.camera.up), (DVec3::new(0.0, 0.1, 0.0), DVec3::NEG_Z));
     assert!((scene.camera.vertical_fov - 50.0_f64.to_radians()).abs() < 1e-15);
-    assert_eq!((scene.render.model, scene.render.samples), (Some(Model::Path), Some(7)));
+    assert_eq!((scene.render.model, scene.render.samples), (Some(Model::Path.into()), Some(7)));
     assert_eq!(scene.lights.len(), 1);
     assert_eq!(scene.lights[0].intensity, DVec3::new(10.0, 10.0, 5.0));
 

@@ -106,7 +106,7 @@ impl Device {
 }
 
 fn sized(size: Size) -> RenderArgs {
-    RenderArgs { model: Some(Model::Tree), size: Some(size), samples: Some(1), ..RenderArgs::default() }
+    RenderArgs { model: Some(Model::Tree.into()), size: Some(size), samples: Some(1), ..RenderArgs::default() }
 }
 
 impl Picture {

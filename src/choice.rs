@@ -1,0 +1,421 @@
+//! `--model auto`: the model and settings that keep a tolerance at the least cost, or that are best within a time.
+//!
+//! In flow a scene and a device, out flows what to ask of a render, and what to expect of it. Small pictures of each model, the pilots,
+//! tell how long a sample takes and how the error falls with their number. The error of a picture is the |x - r| / (r + 0.1) that 95 %
+//! of the pixels keep, each channel for itself.
+//!
+//! A model that simulates all that is wanted errs by its samples and by what it cuts off: pilots of different seeds, and of finer
+//! cut-offs, tell. What the other models make of the scene is held against `path`, the noise of which counts as their error: where it
+//! is larger than the tolerance, they are not chosen.
+
+use std::time::{Duration, Instant};
+
+use crate::gpu::{DeviceKind, Gpu};
+use crate::options::{MOST_SAMPLES, Model, RenderArgs, Size};
+use crate::passes::{self, MOST_PIXELS, Rendered, Renderer};
+use crate::plan::{DEPTH_OF_TOLERANCE, Plan};
+use crate::scene::Scene;
+use crate::{Error, Result};
+
+/// What is tolerated where nothing is said: few see it.
+pub const TOLERANCE: f64 = 0.05;
+
+/// Pixels of a pilot in a row, and on devices that are only busy with many.
+const WIDTH: u32 = 64;
+const WIDTH_OF_GPUS: u32 = 256;
+
+/// Samples of the pilots; many those of `path` where more are quick.
+const FEW: u32 = 4;
+const MORE: u32 = 16;
+const MANY: u32 = 64;
+const QUICK: Duration = Duration::from_millis(250);
+
+/// Cut-offs and depths of `tree`, from the default on, each followed further than the one before.
+const RUNGS: [(Option<f64>, u32); 4] =
+    [(None, 32), (Some(1e-2), 128), (Some(1e-3), 512), (Some(1e-4), DEPTH_OF_TOLERANCE)];
+
+/// The share of the error that may be what is cut off.
+const CUT_SHARE: f64 = 1.0 / 3.0;
+
+/// The share of a time budget that pilots may take, and the longest one of `tree` that is followed by a finer one.
+const PILOT_SHARE: f64 = 0.2;
+const LONG: Duration = Duration::from_secs(1);
+
+/// Budgets below this leave no time for pilots.
+const SHORT: f64 = 5.0;
+
+/// What is asked of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Goal {
+    /// The error that 95 % of the pixels should keep.
+    pub tolerance: Option<f64>,
+    /// Seconds that it may take.
+    pub seconds: Option<f64>,
+}
+
+/// A model with settings, and what is expected of it.
+#[derive(Clone, Debug)]
+pub struct Candidate {
+    /// What to ask of a render.
+    pub args: RenderArgs,
+    /// What that amounts to.
+    pub model: Model,
+    /// Samples per pixel.
+    pub samples: u32,
+    /// Milliseconds of all samples: of the device, or where that has no clock of the host.
+    pub ms: f64,
+    /// The error that 95 % of the pixels are expected to keep.
+    pub error: f64,
+}
+
+impl Candidate {
+    /// The options that belong to the model, as text.
+    pub fn options(&self) -> String {
+        let RenderArgs { model, samples, max_depth, tolerance, .. } = self.args;
+        RenderArgs { model, samples, max_depth, tolerance, ..RenderArgs::default() }.to_string()
+    }
+}
+
+/// What was found.
+#[derive(Clone, Debug)]
+pub struct Choice {
+    /// What was asked for.
+    pub goal: Goal,
+    /// What is chosen.
+    pub best: Candidate,
+    /// What else could be done, the better ones first.
+    pub others: Vec<Candidate>,
+    /// Whether the best keeps what was asked for, as far as is known.
+    pub is_expected: bool,
+    /// Whether pilots were rendered; where there was no time for them errors and times are not known, and not finite.
+    pub measured: bool,
+    /// The time that it took to find out.
+    pub taken: Duration,
+}
+
+/// How error and time of a model go with the number of samples.
+#[derive(Clone, Copy, Debug)]
+struct Law {
+    /// What stays with any number of samples.
+    floor: f64,
+    /// What one sample adds to that, and the power of their number that it falls with.
+    spread: f64,
+    power: f64,
+    /// Milliseconds of a sample of the whole picture.
+    ms: f64,
+}
+
+impl Law {
+    fn error(&self, samples: u32) -> f64 {
+        self.floor.hypot(self.spread * f64::from(samples).powf(-self.power))
+    }
+
+    /// How many samples it takes to err no more than that, if any number does.
+    fn samples(&self, error: f64) -> Option<u32> {
+        let left = (error * error - self.floor * self.floor).sqrt();
+        if left.is_nan() || left <= 0.0 {
+            return None;
+        }
+        let samples = (self.spread / left).powf(1.0 / self.power).ceil().max(1.0);
+        (samples <= f64::from(MOST_SAMPLES)).then_some(samples as u32)
+    }
+}
+
+/// Finds what to ask of a render of `scene` with `args`, whose model is to be chosen. The camera is framed already.
+pub fn choose(gpu: &Gpu, scene: &Scene, args: &RenderArgs) -> Result<Choice> {
+    let start = Instant::now();
+    let goal = Goal {
+        tolerance: args.tolerance.or(args.time_budget.is_none().then_some(TOLERANCE)),
+        seconds: args.time_budget,
+    };
+    let mut pilots = Pilots::new(gpu, scene, args, goal);
+    if goal.seconds.is_none_or(|seconds| seconds >= SHORT) {
+        // Where `tree` needs no truth to be held against, it is the likelier choice.
+        if pilots.is_tree_exact() {
+            pilots.tree()?;
+            pilots.path()?;
+        } else {
+            pilots.path()?;
+            pilots.tree()?;
+        }
+        pilots.raster(Model::Double)?;
+        pilots.raster(Model::Single)?;
+    }
+    let taken = start.elapsed();
+    let (mut candidates, is_expected) = ranked(&pilots.laws, args, goal, taken);
+    let measured = !candidates.is_empty();
+    let best = if measured { candidates.remove(0) } else { pilots.unmeasured()? };
+    Ok(Choice { goal, best, others: candidates, is_expected, measured, taken })
+}
+
+/// `args`, whose model is to be chosen, with one that takes them.
+pub fn with_any_model(scene: &Scene, args: &RenderArgs) -> Result<RenderArgs> {
+    let with = |model: Model| RenderArgs { model: Some(model.into()), ..args.clone() };
+    let takes = |model: &Model| Plan::new(scene, &with(*model)).is_ok();
+    [Model::Path, Model::Tree, Model::Double, Model::Single].into_iter().find(takes).map(with).ok_or_else(no_model)
+}
+
+/// What each law comes to for what is asked, the best first, and whether that keeps it.
+fn ranked(laws: &[(RenderArgs, Model, Law)], args: &RenderArgs, goal: Goal, taken: Duration) -> (Vec<Candidate>, bool) {
+    let most = args.samples.unwrap_or(MOST_SAMPLES);
+    let left_ms = goal.seconds.map_or(f64::INFINITY, |seconds| (seconds - taken.as_secs_f64()).max(0.0) * 1e3);
+    let candidate = |(options, model, law): &(RenderArgs, Model, Law)| {
+        let affordable = ((left_ms / law.ms).floor().clamp(1.0, f64::from(most))) as u32;
+        let needed = goal.tolerance.and_then(|tolerance| law.samples(tolerance));
+        // Where nothing is enough, the most that is reasonable.
+        let mut samples = needed.unwrap_or(if left_ms.is_finite() { most } else { most.min(MORE) }).min(affordable);
+        if *model == Model::Path && args.samples.is_none() {
+            samples = samples.next_multiple_of(passes::OPEN_BATCH);
+        }
+        // With a time budget as many as fit, and `path` stops by its own tolerance.
+        let open = *model == Model::Path || needed.is_none() && goal.seconds.is_some();
+        let args = RenderArgs { samples: if open { args.samples } else { Some(samples) }, ..options.clone() };
+        Candidate { args, model: *model, samples, ms: law.ms * f64::from(samples), error: law.error(samples) }
+    };
+    let mut all: Vec<_> =
+        laws.iter().map(candidate).filter(|one| one.error.is_finite() && one.ms.is_finite()).collect();
+    let keeps = |one: &Candidate| {
+        let close = goal.tolerance.is_none_or(|tolerance| one.error <= tolerance * (1.0 + 1e-9));
+        close && one.ms <= left_ms
+    };
+    // Those that keep it by their time, then the others by their error; without a tolerance all by their error.
+    all.sort_by(|a, b| {
+        let both = goal.tolerance.is_some() && keeps(a) && keeps(b);
+        let by_error = a.error.total_cmp(&b.error).then(a.ms.total_cmp(&b.ms));
+        keeps(b).cmp(&keeps(a)).then(if both { a.ms.total_cmp(&b.ms) } else { by_error })
+    });
+    let is_expected = all.first().is_some_and(keeps);
+    (all, is_expected)
+}
+
+/// Small pictures, and what they tell.
+struct Pilots<'a> {
+    gpu: &'a Gpu,
+    scene: &'a Scene,
+    /// The options of the render but for the model, and what belongs to one.
+    args: &'a RenderArgs,
+    goal: Goal,
+    start: Instant,
+    size: Size,
+    /// How many times the pixels of a pilot the whole picture has.
+    pixels: f64,
+    laws: Vec<(RenderArgs, Model, Law)>,
+    /// The mean of what `path` saw, if it sees all there is.
+    truth: Option<Vec<[f32; 3]>>,
+}
+
+impl<'a> Pilots<'a> {
+    fn new(gpu: &'a Gpu, scene: &'a Scene, args: &'a RenderArgs, goal: Goal) -> Self {
+        let size = args.size.unwrap_or(Plan::SIZE);
+        let width = if gpu.info().kind == DeviceKind::Cpu { WIDTH } else { WIDTH_OF_GPUS }.min(size.width);
+        let height = (f64::from(width) / f64::from(size.width) * f64::from(size.height)).round().max(1.0) as u32;
+        let small = Size { width, height };
+        let pixels = size.pixels() / small.pixels();
+        Self { gpu, scene, args, goal, start: Instant::now(), size: small, pixels, laws: Vec::new(), truth: None }
+    }
+
+    /// `args` for one model; `None` where it refuses them.
+    fn options(&self, model: Model, tolerance: Option<f64>, depth: Option<u32>) -> Option<RenderArgs> {
+        let args = RenderArgs {
+            model: Some(model.into()),
+            tolerance,
+            max_depth: self.args.max_depth.or(depth),
+            ..self.args.clone()
+        };
+        Plan::new(self.scene, &args).is_ok().then_some(args)
+    }
+
+    /// The plan of a pilot of a render with `args`.
+    fn plan(&self, args: &RenderArgs, samples: u32, seed: u64) -> Result<Plan> {
+        let small = RenderArgs {
+            size: Some(self.size),
+            samples: Some(samples),
+            seed: Some(self.args.seed.unwrap_or(0) ^ seed),
+            time_budget: None,
+            checkpoint: None,
+            aov: None,
+            ..args.clone()
+        };
+        // Of `path` a tolerance would end the pilot.
+        let tolerance = small.tolerance.filter(|_| small.model == Some(Model::Tree.into()));
+        Plan::new(self.scene, &RenderArgs { tolerance, ..small })
+    }
+
+    /// Whether there is time for another.
+    fn has_time(&self) -> bool {
+        self.goal.seconds.is_none_or(|seconds| self.start.elapsed().as_secs_f64() < PILOT_SHARE * seconds)
+    }
+
+    /// Milliseconds of a sample of the whole picture.
+    fn ms(&self, rendered: &Rendered, host: Duration) -> f64 {
+        rendered.gpu_ms().unwrap_or(host.as_secs_f64() * 1e3) * self.pixels / f64::from(rendered.samples)
+    }
+
+    fn is_tree_exact(&self) -> bool {
+        let plan = self.options(Model::Tree, None, None).map(|args| Plan::new(self.scene, &args));
+        plan.is_some_and(|plan| plan.is_ok_and(|plan| plan.lacks() == 0))
+    }
+
+    /// What to do without pilots: the first model that simulates all that is wanted, else the one that leaves out least.
+    fn unmeasured(&self) -> Result<Candidate> {
+        let options = |model| self.options(model, None, None);
+        let plans = [Model::Tree, Model::Path, Model::Double, Model::Single].into_iter().filter_map(options);
+        let plans: Vec<_> =
+            plans.filter_map(|args| Plan::new(self.scene, &args).ok().map(|plan| (args, plan))).collect();
+        let (args, plan) = plans.into_iter().min_by_key(|(_, plan)| plan.lacks()).ok_or_else(no_model)?;
+        let samples = self.args.samples.unwrap_or(MORE);
+        Ok(Candidate { args, model: plan.model, samples, ms: f64::NAN, error: f64::NAN })
+    }
+
+    /// Two pictures of `path`: they tell its own error, and the truth for others.
+    fn path(&mut self) -> Result<()> {
+        let args = self.options(Model::Path, self.goal.tolerance, Some(DEPTH_OF_TOLERANCE));
+        let Some(args) = args.filter(|_| self.has_time()) else { return Ok(()) };
+        let plan = self.plan(&args, MORE, 0x5eed_0001)?;
+        if !plan.unseen.is_empty() {
+            return Ok(());
+        }
+        let mut renderer = Renderer::new(self.gpu, self.scene, &plan)?;
+        let mut picture = |samples, seed| -> Result<(Rendered, Duration)> {
+            let plan = self.plan(&args, samples, seed)?;
+            renderer.set_limits(&plan)?;
+            let start = Instant::now();
+            Ok((renderer.render(&plan, &mut |_| {})?, start.elapsed()))
+        };
+        let (mut first, time) = picture(MORE, 0x5eed_0001)?;
+        let mut samples = MORE;
+        if time < QUICK {
+            samples = MANY;
+            (first, _) = picture(MANY, 0x5eed_0001)?;
+        }
+        let (second, time) = picture(samples, 0x5eed_0002)?;
+        let ms = self.ms(&second, time);
+        let truth: Vec<_> = first.radiance.iter().zip(&second.radiance).map(mean).collect();
+        // The difference of two has twice the variance of one.
+        let error = first.radiance.iter().zip(&second.radiance).map(|(a, b)| relative(a, b));
+        let error = self.most(error.flatten()) / 2.0_f64.sqrt();
+        let spread = error * f64::from(samples).sqrt();
+        self.laws.push((args, Model::Path, Law { floor: 0.0, spread, power: 0.5, ms }));
+        self.truth = Some(truth);
+        Ok(())
+    }
+
+    /// Pictures of `tree`: with other seeds, and followed further and further.
+    fn tree(&mut self) -> Result<()> {
+        if !self.has_time() {
+            return Ok(());
+        }
+        let rung = |&(tolerance, depth): &(Option<f64>, u32)| self.options(Model::Tree, tolerance, Some(depth));
+        let rungs: Vec<_> = RUNGS.iter().filter_map(rung).collect();
+        let Some(args) = rungs.first() else { return Ok(()) };
+        let plan = self.plan(args, FEW, 0)?;
+        let mut renderer = Renderer::new(self.gpu, self.scene, &plan)?;
+        if plan.lacks() > 0 {
+            return self.inexact(renderer, args.clone());
+        }
+        let (spread, power) = self.spread(&mut renderer, args)?;
+        let mut before: Option<(RenderArgs, Rendered, f64)> = None;
+        for args in rungs {
+            let plan = self.plan(&args, FEW, 0)?;
+            renderer.set_limits(&plan)?;
+            let start = Instant::now();
+            let rendered = renderer.render(&plan, &mut |_| {})?;
+            let (host, ms) = (start.elapsed(), self.ms(&rendered, start.elapsed()));
+            let before_it = before.replace((args, rendered.clone(), ms));
+            let Some((args, coarse, ms)) = before_it else { continue };
+            let error = coarse.radiance.iter().zip(&rendered.radiance).map(|(a, b)| relative(a, b));
+            let floor = self.most(error.flatten());
+            self.laws.push((args, Model::Tree, Law { floor, spread, power, ms }));
+            let is_enough = floor <= CUT_SHARE * self.goal.tolerance.unwrap_or(1e-3);
+            if is_enough || host > LONG || !self.has_time() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// A rasterised model.
+    fn raster(&mut self, model: Model) -> Result<()> {
+        match self.options(model, None, None) {
+            Some(args) if self.has_time() && self.truth.is_some() => {
+                let renderer = Renderer::new(self.gpu, self.scene, &self.plan(&args, MORE, 0)?)?;
+                self.inexact(renderer, args)
+            }
+            _ => Ok(()),
+        }
+    }
+
+    /// A model that is known to be wrong: the truth tells by how much.
+    fn inexact(&mut self, mut renderer: Renderer, args: RenderArgs) -> Result<()> {
+        let Some(truth) = self.truth.take() else { return Ok(()) };
+        let (spread, power) = self.spread(&mut renderer, &args)?;
+        let plan = self.plan(&args, MORE, 0)?;
+        renderer.set_limits(&plan)?;
+        let start = Instant::now();
+        let rendered = renderer.render(&plan, &mut |_| {})?;
+        let ms = self.ms(&rendered, start.elapsed());
+        let floor = self.most(rendered.radiance.iter().zip(&truth).flat_map(|(a, b)| relative(a, b)));
+        let ms = if plan.model.traces() { ms } else { self.raster_ms(&args)? };
+        self.laws.push((args, plan.model, Law { floor, spread, power, ms }));
+        self.truth = Some(truth);
+        Ok(())
+    }
+
+    /// Milliseconds of a sample of the whole picture, of a model that is quick and whose time is not that of its pixels.
+    fn raster_ms(&self, args: &RenderArgs) -> Result<f64> {
+        let samples = Some(1);
+        let whole = RenderArgs { samples, time_budget: None, tolerance: None, aov: None, ..args.clone() };
+        let plan = Plan::new(self.scene, &whole)?;
+        let mut renderer = Renderer::new(self.gpu, self.scene, &plan)?;
+        let start = Instant::now();
+        let rendered = renderer.render(&plan, &mut |_| {})?;
+        Ok(rendered.gpu_ms().unwrap_or(start.elapsed().as_secs_f64() * 1e3))
+    }
+
+    /// How the error of one sample is, and how it falls with their number: pictures of two seeds, of few samples and of more.
+    fn spread(&self, renderer: &mut Renderer, args: &RenderArgs) -> Result<(f64, f64)> {
+        let mut error_of = |samples| -> Result<f64> {
+            let mut picture = |seed| -> Result<Vec<[f32; 3]>> {
+                let plan = self.plan(args, samples, seed)?;
+                renderer.set_limits(&plan)?;
+                Ok(renderer.render(&plan, &mut |_| {})?.radiance)
+            };
+            let (first, second) = (picture(0x5eed_0003)?, picture(0x5eed_0004)?);
+            let error = first.iter().zip(&second).flat_map(|(a, b)| relative(a, b));
+            Ok(self.most(error) / 2.0_f64.sqrt())
+        };
+        let (few, more) = (error_of(FEW)?, error_of(MORE)?);
+        if more <= 0.0 || few <= 0.0 {
+            return Ok((few, 0.5));
+        }
+        let power = ((few / more).ln() / f64::from(MORE / FEW).ln()).clamp(0.5, 1.0);
+        Ok((more * f64::from(MORE).powf(power), power))
+    }
+
+    /// What all but the worst are within.
+    fn most(&self, errors: impl Iterator<Item = f64>) -> f64 {
+        let mut errors: Vec<_> = errors.collect();
+        errors.sort_by(f64::total_cmp);
+        let place = (errors.len() as f64 * MOST_PIXELS).ceil() as usize;
+        errors.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+    }
+}
+
+/// No model takes the options that are given.
+fn no_model() -> Error {
+    Error::Usage(
+        "--model auto: no model takes these options together; leave --aov or --checkpoint out, or name a model".into(),
+    )
+}
+
+/// The relative difference of two pixels, of each channel.
+fn relative(a: &[f32; 3], b: &[f32; 3]) -> [f64; 3] {
+    std::array::from_fn(|i| {
+        let (a, b) = (f64::from(a[i]), f64::from(b[i]));
+        (a - b).abs() / (passes::DARK + 0.5 * (a + b).abs())
+    })
+}
+
+fn mean((a, b): (&[f32; 3], &[f32; 3])) -> [f32; 3] {
+    std::array::from_fn(|i| a[i].midpoint(b[i]))
+}

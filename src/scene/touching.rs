@@ -1,0 +1,152 @@
+//! Walls at one place. In flow bodies of glass, out flow the pairs of them with triangles that lie on each other.
+//!
+//! Which of two such walls a ray meets first is up to rounding: liquid in a glass has to overlap its wall, or to stay clear of it.
+
+use std::time::Duration;
+
+use glam::DVec3;
+use obvhs::BvhBuildParams;
+use obvhs::aabb::Aabb;
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::builder::build_bvh2;
+
+use super::{Bounds, Object, Scene, Surface};
+
+/// How far apart walls are that count as touching, in the size of the smaller body, and how parallel.
+const NEAR: f64 = 1e-5;
+const PARALLEL: f64 = 0.9999;
+
+/// Pairs of bodies that are looked at.
+const MOST_PAIRS: usize = 4096;
+
+/// Two bodies with walls at one place, or one whose own are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Touch {
+    /// Their places among the objects.
+    pub objects: [usize; 2],
+    /// Triangles of the first whose middle lies on the second.
+    pub triangles: usize,
+}
+
+impl Scene {
+    /// Bodies of glass whose walls lie on each other, of as many pairs as can be looked at.
+    pub fn touching(&self) -> Vec<Touch> {
+        let is_body = |object: &Object| matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled);
+        let bodies: Vec<_> = (0..self.objects.len()).filter(|&number| is_body(&self.objects[number])).collect();
+        let bounds: Vec<_> = bodies.iter().map(|&number| self.bounds_of(&self.objects[number])).collect();
+        let pairs = (0..bodies.len()).flat_map(|a| (a..bodies.len()).map(move |b| (a, b)));
+        let meet = pairs.filter(|&(a, b)| a == b || bounds[a].intersects(&bounds[b])).take(MOST_PAIRS);
+        let mut walls: Vec<Option<Walls>> = bodies.iter().map(|_| None).collect();
+        let mut found = Vec::new();
+        for (a, b) in meet {
+            for body in [a, b] {
+                walls[body].get_or_insert_with(|| Walls::new(self, &self.objects[bodies[body]]));
+            }
+            let (Some(first), Some(second)) = (&walls[a], &walls[b]) else { continue };
+            let near = NEAR * bounds[a].extent().max_element().min(bounds[b].extent().max_element());
+            let triangles = first.on(second, near, &bounds[b], a == b);
+            if triangles > 0 {
+                found.push(Touch { objects: [bodies[a], bodies[b]], triangles });
+            }
+        }
+        found
+    }
+}
+
+/// The triangles of a body in the world, and a hierarchy over them.
+struct Walls {
+    triangles: Vec<[DVec3; 3]>,
+    bvh: Bvh2,
+}
+
+impl Walls {
+    fn new(scene: &Scene, object: &Object) -> Self {
+        let mesh = &scene.meshes[object.mesh];
+        let place = |&vertex: &u32| {
+            object.transform.transform_point3(DVec3::from_array(mesh.positions[vertex as usize].map(f64::from)))
+        };
+        let triangles: Vec<[DVec3; 3]> =
+            mesh.triangles.iter().map(|triangle| std::array::from_fn(|i| place(&triangle[i]))).collect();
+        let boxes: Vec<_> =
+            triangles.iter().map(|corners| wide(Bounds::around(corners.iter().copied()), 0.0)).collect();
+        Self { triangles, bvh: build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default()) }
+    }
+
+    /// How many triangles have their middle within `near` of one of `other`, which lies in `bounds`, and as it lies.
+    fn on(&self, other: &Self, near: f64, bounds: &Bounds, same: bool) -> usize {
+        let touches = |(number, corners): &(usize, &[DVec3; 3])| {
+            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let reach = Bounds { min: middle - near, max: middle + near };
+            if !reach.intersects(bounds) {
+                return false;
+            }
+            let normal = normal(corners);
+            let mut found = false;
+            other.bvh.aabb_traverse(wide(reach, near), |bvh, node| {
+                let node = &bvh.nodes[node as usize];
+                let held = node.first_index as usize..(node.first_index + node.prim_count) as usize;
+                found |= bvh.primitive_indices[held].iter().any(|&candidate| {
+                    let candidate = candidate as usize;
+                    let wall = &other.triangles[candidate];
+                    // Neighbours share corners; what shares all three lies there twice.
+                    let is_neighbour =
+                        || (1..3).contains(&corners.iter().filter(|corner| wall.contains(corner)).count());
+                    !(same && (candidate == *number || is_neighbour()))
+                        && normal.dot(self::normal(wall)).abs() > PARALLEL
+                        && lies_on(middle, wall, near)
+                });
+                !found
+            });
+            found
+        };
+        self.triangles.iter().enumerate().filter(touches).count()
+    }
+}
+
+fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
+    (b - a).cross(c - a).normalize_or_zero()
+}
+
+/// Whether `point` is within `near` of the plane of the triangle, and above or below it.
+fn lies_on(point: DVec3, corners: &[DVec3; 3], near: f64) -> bool {
+    let normal = normal(corners);
+    let is_inside = |i: usize| {
+        let (from, to) = (corners[i], corners[(i + 1) % 3]);
+        (to - from).cross(point - from).dot(normal) >= -near * (to - from).length()
+    };
+    normal.dot(point - corners[0]).abs() <= near && (0..3).all(is_inside)
+}
+
+/// `bounds` with `room` on all sides, and as much as 32-bit numbers lose.
+fn wide(bounds: Bounds, room: f64) -> Aabb {
+    let room = DVec3::splat(room + 1e-6 * bounds.reach());
+    Aabb::new((bounds.min - room).as_vec3().into(), (bounds.max + room).as_vec3().into())
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DAffine3;
+
+    use super::*;
+    use crate::scene::Overrides;
+
+    #[test]
+    fn walls_at_one_place_are_found() {
+        let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        assert_eq!(scene.touching(), [], "the built-in scene");
+        let all = scene.meshes[scene.objects[2].mesh].triangles.len();
+        // The same again, by an error of the size of a 32-bit number's, and off by more.
+        let twin = |offset: f64| {
+            let body = scene.objects[2].clone();
+            Object { transform: DAffine3::from_translation(DVec3::splat(offset)) * body.transform, ..body }
+        };
+        let [near, far] = [1e-8, 1e-3].map(twin);
+        scene.objects.push(near);
+        let found = scene.touching();
+        assert_eq!(found.iter().map(|touch| touch.objects).collect::<Vec<_>>(), [[2, 4]]);
+        assert!(found[0].triangles > all * 95 / 100, "{} of {all}", found[0].triangles);
+        scene.objects[4] = far;
+        let touching: usize = scene.touching().iter().map(|touch| touch.triangles).sum();
+        assert!(touching < all / 20, "{touching} of {all}");
+    }
+}
