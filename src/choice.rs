@@ -34,6 +34,12 @@ const QUICK: Duration = Duration::from_millis(250);
 const RUNGS: [(Option<f64>, u32); 4] =
     [(None, 32), (Some(1e-2), 128), (Some(1e-3), 512), (Some(1e-4), DEPTH_OF_TOLERANCE)];
 
+/// The power of the number of samples that errors fall with at most: that of edges under evenly spread points.
+const EDGES: f64 = 0.75;
+
+/// How much larger than the pilots say the error of samples may be: they are few pixels.
+const MARGIN: f64 = 1.4;
+
 /// The share of the error that may be what is cut off.
 const CUT_SHARE: f64 = 1.0 / 3.0;
 
@@ -110,13 +116,13 @@ impl Law {
         self.floor.hypot(self.spread * f64::from(samples).powf(-self.power))
     }
 
-    /// How many samples it takes to err no more than that, if any number does.
+    /// How many samples it takes to err no more than that, if any number does; no fewer than were tried.
     fn samples(&self, error: f64) -> Option<u32> {
         let left = (error * error - self.floor * self.floor).sqrt();
         if left.is_nan() || left <= 0.0 {
             return None;
         }
-        let samples = (self.spread / left).powf(1.0 / self.power).ceil().max(1.0);
+        let samples = (MARGIN * self.spread / left).powf(1.0 / self.power).ceil().max(f64::from(FEW));
         (samples <= f64::from(MOST_SAMPLES)).then_some(samples as u32)
     }
 }
@@ -388,7 +394,7 @@ impl<'a> Pilots<'a> {
         if more <= 0.0 || few <= 0.0 {
             return Ok((few, 0.5));
         }
-        let power = ((few / more).ln() / f64::from(MORE / FEW).ln()).clamp(0.5, 1.0);
+        let power = ((few / more).ln() / f64::from(MORE / FEW).ln()).clamp(0.5, EDGES);
         Ok((more * f64::from(MORE).powf(power), power))
     }
 

@@ -56,6 +56,10 @@ pub const DARK: f64 = 0.1;
 /// The share of the pixels whose error a tolerance holds for.
 pub const MOST_PIXELS: f64 = 0.95;
 
+/// The share that standard errors should say so, since they are too small where light is rare: with 0.95, of ten scenes at a tolerance
+/// of 0.1 the worst had 94.3 % (`benches/estimates.rs`).
+const PIXELS_BY_STDERR: f64 = 0.965;
+
 /// The mean over pixels and channels of standard error / (value + 0.1).
 pub fn relative_error(radiance: &[[f32; 3]], stderr: &[[f32; 3]]) -> f64 {
     let errors: f64 = relative_errors(radiance, stderr).sum();
@@ -74,7 +78,7 @@ pub fn error_of_most(radiance: &[[f32; 3]], stderr: &[[f32; 3]]) -> f64 {
     let (mut low, mut high) = (0.0, 2.0 * most);
     for _ in 0..40 {
         let middle = 0.5 * (low + high);
-        if share_within(&errors, middle) < MOST_PIXELS { low = middle } else { high = middle }
+        if share_within(&errors, middle) < PIXELS_BY_STDERR { low = middle } else { high = middle }
     }
     high
 }
@@ -82,7 +86,7 @@ pub fn error_of_most(radiance: &[[f32; 3]], stderr: &[[f32; 3]]) -> f64 {
 /// Whether a picture keeps a tolerance: [`relative_error`] is below it, and the error of [`MOST_PIXELS`].
 pub fn is_within(radiance: &[[f32; 3]], stderr: &[[f32; 3]], tolerance: f64) -> bool {
     let errors: Vec<_> = relative_errors(radiance, stderr).collect();
-    relative_error(radiance, stderr) < tolerance && share_within(&errors, tolerance) >= MOST_PIXELS
+    relative_error(radiance, stderr) < tolerance && share_within(&errors, tolerance) >= PIXELS_BY_STDERR
 }
 
 /// The share of normally distributed errors, of these standard deviations, that are expected to be within `bound`.
@@ -132,13 +136,13 @@ mod tests {
 
     #[test]
     fn a_tolerance_holds_for_most_pixels() {
-        // Of one deviation 95 % are within 1.96 of it.
+        // Of one deviation 96.5 % are within 2.108 of it.
         let (ones, tenths) = (vec![[0.9; 3]; 100], vec![[0.1; 3]; 100]);
-        assert!((error_of_most(&ones, &tenths) - 0.196).abs() < 1e-4);
+        assert!((error_of_most(&ones, &tenths) - 0.2108).abs() < 1e-4);
         assert!((relative_error(&ones, &tenths) - 0.1).abs() < 1e-6);
-        assert!(is_within(&ones, &tenths, 0.197) && !is_within(&ones, &tenths, 0.195));
+        assert!(is_within(&ones, &tenths, 0.212) && !is_within(&ones, &tenths, 0.210));
         // Few pixels may be as wrong as they like, but for the mean.
-        let few = |error| (0..100).map(|i| [if i < 4 { error } else { 0.0 }; 3]).collect::<Vec<_>>();
+        let few = |error| (0..100).map(|i| [if i < 3 { error } else { 0.0 }; 3]).collect::<Vec<_>>();
         assert!(is_within(&ones, &few(1.0), 0.05) && !is_within(&ones, &few(1.0), 0.03));
         assert!(error_of_most(&ones, &few(f32::INFINITY)) == f64::INFINITY);
         assert!(!is_within(&ones, &few(f32::NAN), 0.1), "what is not known");

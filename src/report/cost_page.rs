@@ -142,6 +142,34 @@ fn axis(values: impl Iterator<Item = f64>) -> Axis {
     Axis { from, to, ticks: (from as i32..=to as i32).map(f64::from).collect() }
 }
 
+/// Pixels of a label's font, and about as many of a letter.
+const LABEL: i32 = 13;
+const LETTER: i32 = 7;
+
+/// The boxes of labels: left, top, right, bottom.
+#[derive(Default)]
+struct Labels(Vec<[i32; 4]>);
+
+impl Labels {
+    /// Where `text` goes, seen from its point, so that it covers no other: above, below or left of it, else nowhere.
+    fn place(&mut self, (x, y): (i32, i32), text: &str) -> Option<(i32, i32)> {
+        let width = LETTER * text.len() as i32;
+        let places = [(8, -LABEL - 3), (8, 4), (-8 - width, -LABEL - 3), (-8 - width, 4)];
+        places.into_iter().find(|(dx, dy)| {
+            let [left, top] = [x + dx, y + dy];
+            let own = [left, top, left + width, top + LABEL];
+            let is_free = !self
+                .0
+                .iter()
+                .any(|other| own[0] < other[2] && other[0] < own[2] && own[1] < other[3] && other[1] < own[3]);
+            if is_free {
+                self.0.push(own);
+            }
+            is_free
+        })
+    }
+}
+
 /// relMSE against milliseconds, both logarithmic: a curve for each model, settings apart from its samples as points.
 fn plot(report: &CostReport) -> std::io::Result<String> {
     let mut text = String::new();
@@ -173,6 +201,7 @@ fn plot(report: &CostReport) -> std::io::Result<String> {
             .draw_series(DashedLineSeries::new(best, 6, 5, INK.stroke_width(1)))?
             .label("nothing else is both faster and closer")
             .legend(|(x, y)| PathElement::new([(x, y), (x + 26, y)], INK.stroke_width(1)));
+        let mut labels = Labels::default();
         for (model, color) in Model::ALL.into_iter().zip(COLORS) {
             let rows = || shown(report).filter(move |row| row.model == model.name());
             let is_plain =
@@ -182,11 +211,14 @@ fn plot(report: &CostReport) -> std::io::Result<String> {
                 .label(model.name())
                 .legend(move |(x, y)| PathElement::new([(x, y), (x + 26, y)], color.stroke_width(3)));
             chart.draw_series(rows().map(|row| Circle::new(point(row), 5, color.filled())))?;
-            let label = |row: &EntryRow| row.label.split_once(", ").map_or(String::new(), |(_, rest)| rest.to_owned());
-            let style = ("sans-serif", 13).into_font().color(&color);
-            chart.draw_series(
-                rows().map(|row| EmptyElement::at(point(row)) + Text::new(label(row), (8, -16), style.clone())),
-            )?;
+            let style = ("sans-serif", LABEL).into_font().color(&color);
+            for row in rows() {
+                let label = row.label.split_once(", ").map_or("", |(_, rest)| rest);
+                if let Some(place) = labels.place(chart.backend_coord(&point(row)), label) {
+                    let text = Text::new(label.to_owned(), place, style.clone());
+                    chart.draw_series([EmptyElement::at(point(row)) + text])?;
+                }
+            }
         }
         chart
             .configure_series_labels()
