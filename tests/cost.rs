@@ -78,6 +78,17 @@ fn models_are_in_the_order_that_they_should_be_in() {
     let page = fs::read_to_string(folder.join("report/index.html")).expect("a page");
     assert!(page.contains("<svg") && !page.contains("src=\"http") && !page.contains("href="), "needs the network");
 
+    // Every member is in the docs; those of the device with the stats.
+    let docs = include_str!("../docs/cost.md").split_once("## cost.json").expect("a section").1;
+    let mut members = first.as_object().expect("an object").clone();
+    for list in ["entries", "left_out", "targets", "effects", "reference"] {
+        let inner = if list == "reference" { &first[list] } else { &first[list][0] };
+        members.extend(inner.as_object().cloned().unwrap_or_default());
+    }
+    for name in members.keys() {
+        assert!(docs.contains(&format!("`{name}`")), "docs/cost.md lacks {name}");
+    }
+
     // Another run goes on from the reference of the first; that of another scene is made anew.
     assert!(cost(folder, &SMALL).status.success());
     let second = report(folder);
@@ -93,6 +104,8 @@ fn bad_usage_ends_with_2() {
     let folder = folder.path();
     write_scene(folder, "[1, 1, 1]");
     fs::write(folder.join("file"), "").expect("a file");
+    fs::create_dir(folder.join("site")).expect("a folder");
+    fs::write(folder.join("site/index.html"), "mine").expect("a page");
     for (args, expected) in [
         (&["scene.toml"][..], "-o DIR"),
         (&["none.toml", "-o", "report"], "none.toml"),
@@ -100,6 +113,7 @@ fn bad_usage_ends_with_2() {
         (&["scene.toml", "-o", "report", "--effects", "magic"], "magic"),
         (&["scene.toml", "-o", "report", "--max-depth", "8"], "32 or more"),
         (&["scene.toml", "-o", "file"], "file"),
+        (&["scene.toml", "-o", "site"], "site/index.html"),
     ] {
         let output = cost(folder, args);
         let message = String::from_utf8_lossy(&output.stderr).into_owned();

@@ -80,6 +80,14 @@ impl CostCommand {
         let folder =
             self.output.as_deref().ok_or_else(|| Error::Usage("cost needs a folder for its report: -o DIR".into()))?;
         check_folder(folder, NO_FOLDER)?;
+        let page = folder.join("index.html");
+        if page.exists() && !folder.join("cost.json").exists() {
+            return Err(Error::input(
+                page,
+                0,
+                "is no report of this command and would be replaced; name another folder",
+            ));
+        }
         if let Some(depth) = self.max_depth.filter(|&depth| depth < DEPTH) {
             let why = format!(
                 "the settings follow up to {DEPTH} interfaces, and the reference must, too; give {DEPTH} or more"
@@ -140,7 +148,12 @@ impl CostCommand {
 
     /// The command line that repeats this.
     fn command(&self) -> String {
-        let quoted = |text: String| if text.contains([' ', '"', '\'']) { format!("{text:?}") } else { text };
+        // For a shell as Unix has them.
+        let is_plain = |c: char| c.is_alphanumeric() || "-_./,:+@%".contains(c);
+        let quoted = |text: String| match text.chars().all(is_plain) {
+            true => text,
+            false => format!("'{}'", text.replace('\'', "'\\''")),
+        };
         let path = |path: &PathBuf| quoted(path.display().to_string());
         let options = [
             ("", self.scene.as_ref().map(path)),
