@@ -247,9 +247,9 @@ impl<'a> Pilots<'a> {
         Plan::new(self.scene, &RenderArgs { tolerance, ..small })
     }
 
-    /// Whether there is time for another.
-    fn has_time(&self) -> bool {
-        self.goal.seconds.is_none_or(|seconds| self.start.elapsed().as_secs_f64() < PILOT_SHARE * seconds)
+    /// Whether there is time for another that takes so long.
+    fn fits(&self, time: Duration) -> bool {
+        self.goal.seconds.is_none_or(|seconds| (self.start.elapsed() + time).as_secs_f64() < PILOT_SHARE * seconds)
     }
 
     /// Milliseconds of a sample of the whole picture.
@@ -276,8 +276,8 @@ impl<'a> Pilots<'a> {
     /// Two pictures of `path`: they tell its own error, and the truth for others.
     fn path(&mut self) -> Result<()> {
         let args = self.options(Model::Path, self.goal.tolerance, Some(DEPTH_OF_TOLERANCE));
-        let Some(args) = args.filter(|_| self.has_time()) else { return Ok(()) };
-        let plan = self.plan(&args, MORE, 0x5eed_0001)?;
+        let Some(args) = args.filter(|_| self.fits(Duration::ZERO)) else { return Ok(()) };
+        let plan = self.plan(&args, FEW, 0x5eed_0001)?;
         if !plan.unseen.is_empty() {
             return Ok(());
         }
@@ -288,11 +288,15 @@ impl<'a> Pilots<'a> {
             let start = Instant::now();
             Ok((renderer.render(&plan, &mut |_| {})?, start.elapsed()))
         };
-        let (mut first, time) = picture(MORE, 0x5eed_0001)?;
-        let mut samples = MORE;
-        if time < QUICK {
-            samples = MANY;
-            (first, _) = picture(MANY, 0x5eed_0001)?;
+        let (mut first, time) = picture(FEW, 0x5eed_0001)?;
+        let of = |samples: u32| time * (samples / FEW);
+        let samples = match () {
+            () if of(MANY) < QUICK => MANY,
+            () if self.fits(2 * of(MORE)) => MORE,
+            () => FEW,
+        };
+        if samples > FEW {
+            (first, _) = picture(samples, 0x5eed_0001)?;
         }
         let (second, time) = picture(samples, 0x5eed_0002)?;
         let ms = self.ms(&second, time);
@@ -308,7 +312,7 @@ impl<'a> Pilots<'a> {
 
     /// Pictures of `tree`: with other seeds, and followed further and further.
     fn tree(&mut self) -> Result<()> {
-        if !self.has_time() {
+        if !self.fits(Duration::ZERO) {
             return Ok(());
         }
         let rung = |&(tolerance, depth): &(Option<f64>, u32)| self.options(Model::Tree, tolerance, Some(depth));
@@ -333,7 +337,7 @@ impl<'a> Pilots<'a> {
             let floor = self.most(error.flatten());
             self.laws.push((args, Model::Tree, Law { floor, spread, power, ms }));
             let is_enough = floor <= CUT_SHARE * self.goal.tolerance.unwrap_or(1e-3);
-            if is_enough || host > LONG || !self.has_time() {
+            if is_enough || host > LONG || !self.fits(Duration::ZERO) {
                 break;
             }
         }
@@ -343,7 +347,7 @@ impl<'a> Pilots<'a> {
     /// A rasterised model.
     fn raster(&mut self, model: Model) -> Result<()> {
         match self.options(model, None, None) {
-            Some(args) if self.has_time() && self.truth.is_some() => {
+            Some(args) if self.fits(Duration::ZERO) && self.truth.is_some() => {
                 let renderer = Renderer::new(self.gpu, self.scene, &self.plan(&args, MORE, 0)?)?;
                 self.inexact(renderer, args)
             }
@@ -354,8 +358,10 @@ impl<'a> Pilots<'a> {
     /// A model that is known to be wrong: the truth tells by how much.
     fn inexact(&mut self, mut renderer: Renderer, args: RenderArgs) -> Result<()> {
         let Some(truth) = self.truth.take() else { return Ok(()) };
+        let start = Instant::now();
         let (spread, power) = self.spread(&mut renderer, &args)?;
-        let plan = self.plan(&args, MORE, 0)?;
+        let samples = if self.fits(start.elapsed() * 2) { MORE } else { FEW };
+        let plan = self.plan(&args, samples, 0)?;
         renderer.set_limits(&plan)?;
         let start = Instant::now();
         let rendered = renderer.render(&plan, &mut |_| {})?;
@@ -378,7 +384,8 @@ impl<'a> Pilots<'a> {
         Ok(rendered.gpu_ms().unwrap_or(start.elapsed().as_secs_f64() * 1e3))
     }
 
-    /// How the error of one sample is, and how it falls with their number: pictures of two seeds, of few samples and of more.
+    /// How the error of one sample is, and how it falls with their number: pictures of two seeds, of few samples and, where there is
+    /// time, of more.
     fn spread(&self, renderer: &mut Renderer, args: &RenderArgs) -> Result<(f64, f64)> {
         let mut error_of = |samples| -> Result<f64> {
             let mut picture = |seed| -> Result<Vec<[f32; 3]>> {
@@ -390,9 +397,12 @@ impl<'a> Pilots<'a> {
             let error = first.iter().zip(&second).flat_map(|(a, b)| relative(a, b));
             Ok(self.most(error) / 2.0_f64.sqrt())
         };
-        let (few, more) = (error_of(FEW)?, error_of(MORE)?);
-        if more <= 0.0 || few <= 0.0 {
-            return Ok((few, 0.5));
+        let start = Instant::now();
+        let few = error_of(FEW)?;
+        let is_known = few > 0.0 && self.fits(start.elapsed() * (MORE / FEW));
+        let more = if is_known { error_of(MORE)? } else { 0.0 };
+        if more <= 0.0 {
+            return Ok((few * f64::from(FEW).sqrt(), 0.5));
         }
         let power = ((few / more).ln() / f64::from(MORE / FEW).ln()).clamp(0.5, EDGES);
         Ok((more * f64::from(MORE).powf(power), power))
