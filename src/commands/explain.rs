@@ -9,7 +9,7 @@ use crate::Result;
 use crate::choice::choose;
 use crate::effects::Selection;
 use crate::gpu::{Gpu, Instance};
-use crate::options::{RenderArgs, Size, Trace, range};
+use crate::options::{ModelChoice, RenderArgs, Size, Trace, range};
 use crate::plan::Plan;
 use crate::report::Explanation;
 use crate::scene::Scene;
@@ -59,18 +59,24 @@ pub(super) struct ExplainCommand {
 impl ExplainCommand {
     pub(super) fn run(self) -> Result<()> {
         let mut scene = Scene::load(self.scene.as_deref(), &self.changes.overrides())?;
-        let given =
-            RenderArgs { effects: self.effects.clone(), size: self.size, trace: self.trace, ..RenderArgs::default() };
+        let given = RenderArgs {
+            effects: self.effects.clone(),
+            size: self.size,
+            tolerance: self.tolerance,
+            time_budget: self.time_budget,
+            device: self.device.clone(),
+            trace: self.trace,
+            ..RenderArgs::default()
+        };
         let options = given.or(scene.render.clone());
         let mut explanation = Explanation::new(&scene, &options)?;
-        if self.tolerance.is_some() || self.time_budget.is_some() {
+        let asked = self.tolerance.is_some() || self.time_budget.is_some();
+        if asked || options.model == Some(ModelChoice::Auto) {
             let size = options.size.unwrap_or(Plan::SIZE);
             scene.frame(f64::from(size.width) / f64::from(size.height));
             let instance = Instance::new(/* validation: */ false)?;
-            let gpu = Gpu::open(&instance, instance.choose(self.device.as_deref())?)?;
-            // Only what the command line asks of the picture is planned for.
-            let (tolerance, time_budget) = (self.tolerance, self.time_budget);
-            let choice = choose(&gpu, &scene, &RenderArgs { tolerance, time_budget, ..options })?;
+            let gpu = Gpu::open(&instance, instance.choose(options.device.as_deref())?)?;
+            let choice = choose(&gpu, &scene, &options)?;
             explanation = explanation.with_plan(&gpu.info().name, size, &choice);
         }
         print(&if self.json { explanation.json() } else { explanation.to_string() })

@@ -11,7 +11,7 @@ use crate::choice::{Choice, choose, with_any_model};
 use crate::gpu::{DeviceInfo, Gpu, Instance};
 use crate::image::{FloatImage, ImageFormat, Layer, OutputFile, encode_exr, encode_png};
 use crate::options::{Aov, MOST_DEPTH, Model, ModelChoice, RenderArgs};
-use crate::passes::{self, Rendered};
+use crate::passes::{self, PIXELS_BY_STDERR, Rendered};
 use crate::plan::{Budget, Plan};
 use crate::report::{Run, Stats};
 use crate::scene::{Overrides, Scene};
@@ -147,7 +147,9 @@ impl RenderCommand {
         if stats.non_finite_pixels > 0 {
             talk.note(&format!("warning: {} pixels are not finite", stats.non_finite_pixels));
         }
-        for note in [cut_off(&plan, &stats), too_rough(&plan, &rendered)].into_iter().flatten() {
+        // What was chosen knows of what it cuts off.
+        let cut_off = if choice.is_none() { cut_off(&plan, &stats) } else { None };
+        for note in [cut_off, too_rough(&plan, &rendered)].into_iter().flatten() {
             talk.note(&note);
         }
         talk.note(&summary(output.path(), &stats));
@@ -203,8 +205,8 @@ fn chosen(choice: &Choice) -> Vec<String> {
     let best = &choice.best;
     let options = best.options();
     let seconds = choice.taken.as_secs_f64();
-    if !choice.measured {
-        return vec![format!("note: --model auto: {options}, by the effects of the scene: there is no time to try")];
+    if let Some(why) = choice.unmeasured {
+        return vec![format!("note: --model auto: {options}, by the effects of the scene: {why}")];
     }
     let (error, ms, samples) = (best.error, best.ms, best.samples);
     let mut notes = vec![format!(
@@ -264,9 +266,9 @@ fn too_rough(plan: &Plan, rendered: &Rendered) -> Option<String> {
     let (radiance, stderr) = (&rendered.radiance, rendered.counts.as_ref()?.stderr.as_ref()?);
     let missed = plan.tolerance.is_finite() && !passes::is_within(radiance, stderr, plan.tolerance);
     missed.then(|| {
-        let (asked, samples, most) = (plan.tolerance, rendered.samples, passes::error_of_most(radiance, stderr));
+        let (asked, samples, most) = (plan.tolerance, rendered.samples, passes::error_of(PIXELS_BY_STDERR, radiance, stderr));
         let mean = passes::relative_error(radiance, stderr);
-        format!("note: --tolerance {asked}: after {samples} samples 95 % of the pixels are within {most:.2e}, and the mean relative error is {mean:.2e}; more time or --samples lower it")
+        format!("note: --tolerance {asked}: after {samples} samples 96.5 % of the pixels are within {most:.2e}, and the mean relative error is {mean:.2e}; more time or --samples lower it")
     })
 }
 

@@ -49,7 +49,7 @@ use tree::{Tree, TreeTargets};
 
 pub use aov::Aovs;
 pub use checkpoint::is_checkpoint;
-pub use counts::{Counts, DARK, MOST_PIXELS, error_of_most, is_within, relative_error};
+pub use counts::{Counts, DARK, MOST_PIXELS, PIXELS_BY_STDERR, error_of, is_within, relative_error};
 pub use probe::{Hit, Leaks, Ray, TraceProbe};
 pub use sampling::{OPEN_BATCH, pixel_offsets};
 
@@ -448,6 +448,9 @@ impl Times {
 /// Rounds after which errors are estimated for the first time, and how many times as many make up the next.
 const FIRST_ESTIMATE: u32 = 32;
 const NEXT_ESTIMATE: f64 = 1.2;
+
+/// Samples that `path` takes at least before it looks whether a tolerance is kept.
+pub const FEWEST_OF_TOLERANCE: u32 = FIRST_ESTIMATE * OPEN_BATCH;
 
 /// Whether the error of the picture is as small as was asked for, in models that estimate it.
 fn is_precise(commands: &mut Commands, targets: &Targets, plan: &Plan, rounds: u32) -> Result<bool> {

@@ -46,6 +46,7 @@ pub struct PlanRow {
     pub tolerance: Option<f64>,
     pub time_budget: Option<f64>,
     pub is_expected: bool,
+    pub unmeasured: Option<&'static str>,
     pub best: CandidateRow,
     pub others: Vec<CandidateRow>,
 }
@@ -172,6 +173,7 @@ impl Explanation {
             tolerance: choice.goal.tolerance,
             time_budget: choice.goal.seconds,
             is_expected: choice.is_expected,
+            unmeasured: choice.unmeasured,
             best: CandidateRow::new(&choice.best),
             others: choice.others.iter().map(CandidateRow::new).collect(),
         };
@@ -202,19 +204,19 @@ impl fmt::Display for PlanRow {
         writeln!(f, "\nPlan for {}, {width}x{height} on {}", self.goal(), self.device)?;
         for (i, row) in [&self.best].into_iter().chain(&self.others).enumerate() {
             let Outcome { samples, gpu_ms, error } = row.expected;
-            let expected = match (gpu_ms, error) {
-                (Some(ms), Some(error)) => {
+            let expected = match (gpu_ms, error, samples) {
+                (Some(ms), Some(error), Some(samples)) => {
                     format!(
                         "{:.2} s, {}, 95 % of the pixels within {error:.1e}",
                         ms * 1e-3,
                         counted(samples as usize, "sample")
                     )
                 }
-                _ => "by the effects of the scene: there is no time to try".into(),
+                _ => format!("by the effects of the scene: {}", self.unmeasured.unwrap_or_default()),
             };
             writeln!(f, "{} {:<48} {expected}", if i == 0 { '*' } else { ' ' }, row.options)?;
         }
-        if !self.is_expected {
+        if !self.is_expected && self.unmeasured.is_none() {
             writeln!(f, "  nothing is expected to keep that; the first comes closest")?;
         }
         Ok(())
@@ -590,10 +592,10 @@ mod tests {
         // A body once more at its own place.
         scene.objects.push(scene.objects[2].clone());
         let args = RenderArgs::default();
-        let best = Candidate { args, model: Model::Tree, samples: 4, ms: 10.0, error: 0.04 };
+        let best = Candidate { args, model: Model::Tree, samples: 4, ms: 10.0, error: 0.04, lacks: 0 };
         let goal = Goal { tolerance: Some(0.05), seconds: Some(1.0) };
         let others = vec![Candidate { samples: 9, ..best.clone() }];
-        let choice = Choice { goal, best, others, is_expected: true, measured: true, taken: Duration::ZERO };
+        let choice = Choice { goal, best, others, is_expected: true, unmeasured: None, taken: Duration::ZERO };
         let explanation = explained(&scene, "auto").with_plan("a device", Size { width: 4, height: 3 }, &choice);
         let json: Value = serde_json::from_str(&explanation.json()).expect("JSON");
         assert_eq!(

@@ -7,7 +7,7 @@ use serde::Serialize;
 use crate::choice::{Candidate, Choice};
 use crate::gpu::{DeviceInfo, PassTime};
 use crate::options::Trace;
-use crate::passes::{self, Rendered};
+use crate::passes::{self, MOST_PIXELS, Rendered};
 use crate::plan::Plan;
 use crate::scene::Scene;
 
@@ -59,7 +59,7 @@ pub struct AutoStats {
 #[derive(Clone, Copy, Debug, Serialize)]
 #[allow(missing_docs, reason = "docs/auto.md describes the members")]
 pub struct Outcome {
-    pub samples: u32,
+    pub samples: Option<u32>,
     pub gpu_ms: Option<f64>,
     pub error: Option<f64>,
 }
@@ -83,15 +83,20 @@ impl CandidateRow {
 impl Outcome {
     fn expected(candidate: &Candidate) -> Self {
         let known = |value: f64| value.is_finite().then_some(value);
-        Self { samples: candidate.samples, gpu_ms: known(candidate.ms), error: known(candidate.error) }
+        let (gpu_ms, error) = (known(candidate.ms), known(candidate.error));
+        Self { samples: gpu_ms.map(|_| candidate.samples), gpu_ms, error }
     }
 
     /// The error where the samples of a model tell it, and it has no other.
     fn found(plan: &Plan, rendered: &Rendered) -> Self {
         let stderr = rendered.counts.as_ref().and_then(|counts| counts.stderr.as_deref());
         let stderr = stderr.filter(|_| plan.lacks() == 0);
-        let error = stderr.map(|stderr| passes::error_of_most(&rendered.radiance, stderr));
-        Self { samples: rendered.samples, gpu_ms: rendered.gpu_ms(), error: error.filter(|error| error.is_finite()) }
+        let error = stderr.map(|stderr| passes::error_of(MOST_PIXELS, &rendered.radiance, stderr));
+        Self {
+            samples: Some(rendered.samples),
+            gpu_ms: rendered.gpu_ms(),
+            error: error.filter(|error| error.is_finite()),
+        }
     }
 }
 
@@ -101,7 +106,7 @@ impl AutoStats {
             tolerance: choice.goal.tolerance,
             time_budget: choice.goal.seconds,
             options: choice.best.options(),
-            expected: choice.measured.then(|| Outcome::expected(&choice.best)),
+            expected: choice.unmeasured.is_none().then(|| Outcome::expected(&choice.best)),
             found: Outcome::found(plan, rendered),
             others: choice.others.iter().map(CandidateRow::new).collect(),
             pilots_ms: ms(choice.taken),

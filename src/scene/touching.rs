@@ -44,9 +44,12 @@ impl Scene {
             }
             let (Some(first), Some(second)) = (&walls[a], &walls[b]) else { continue };
             let near = NEAR * bounds[a].extent().max_element().min(bounds[b].extent().max_element());
-            let triangles = first.on(second, near, &bounds[b], a == b);
-            if triangles > 0 {
-                found.push(Touch { objects: [bodies[a], bodies[b]], triangles });
+            // Of large triangles under small ones the middle may lie elsewhere.
+            let (some, others) =
+                (first.on(second, near, &bounds[b], a == b), second.on(first, near, &bounds[a], a == b));
+            if some.max(others) > 0 {
+                let objects = if some >= others { [a, b] } else { [b, a] }.map(|body| bodies[body]);
+                found.push(Touch { objects, triangles: some.max(others) });
             }
         }
         found
@@ -128,7 +131,7 @@ mod tests {
     use glam::DAffine3;
 
     use super::*;
-    use crate::scene::Overrides;
+    use crate::scene::{Mesh, Overrides, RawMesh};
 
     #[test]
     fn walls_at_one_place_are_found() {
@@ -145,6 +148,19 @@ mod tests {
         let found = scene.touching();
         assert_eq!(found.iter().map(|touch| touch.objects).collect::<Vec<_>>(), [[2, 4]]);
         assert!(found[0].triangles > all * 95 / 100, "{} of {all}", found[0].triangles);
+        // The smaller one's triangles are the ones that lie on a larger one's, whichever comes first.
+        let flat = |size: f32| {
+            let corners = [[-size, 0.0, -size], [size, 0.0, -size], [0.0, 0.0, size], [0.0, size, 0.0]];
+            let triangles = vec![[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]];
+            let raw = RawMesh { name: "flat".into(), positions: corners.to_vec(), triangles, ..RawMesh::default() };
+            Mesh::new(raw).expect("a tetrahedron")
+        };
+        let mut table = scene.clone();
+        table.meshes = vec![flat(10.0), flat(0.1)];
+        table.objects = [0, 1].map(|mesh| Object { mesh, ..scene.objects[0].clone() }).to_vec();
+        assert_eq!(table.touching(), [Touch { objects: [1, 0], triangles: 1 }]);
+        table.objects.reverse();
+        assert_eq!(table.touching(), [Touch { objects: [0, 1], triangles: 1 }]);
         scene.objects[4] = far;
         let touching: usize = scene.touching().iter().map(|touch| touch.triangles).sum();
         assert!(touching < all / 20, "{touching} of {all}");
