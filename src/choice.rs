@@ -21,9 +21,10 @@ use crate::{Error, Result};
 /// What is tolerated where nothing is said: few see it.
 pub const TOLERANCE: f64 = 0.05;
 
-/// Pixels of a pilot, and on devices that are only busy with many.
+/// Pixels of a pilot, at most, on devices that are only busy with many, and at least.
 const PIXELS: f64 = 64.0 * 48.0;
 const PIXELS_OF_GPUS: f64 = 256.0 * 192.0;
+const FEWEST_PIXELS: f64 = 16.0 * 12.0;
 
 /// Samples of the pilots; many those of `path` where more are quick.
 const FEW: u32 = 4;
@@ -242,9 +243,9 @@ struct Pilots<'a> {
 impl<'a> Pilots<'a> {
     fn new(gpu: &'a Gpu, scene: &'a Scene, args: &'a RenderArgs, goal: Goal) -> Self {
         let size = args.size.unwrap_or(Plan::SIZE);
-        // Also of pictures that are smaller: few pixels tell little.
-        let wanted = if gpu.info().kind == DeviceKind::Cpu { PIXELS } else { PIXELS_OF_GPUS };
-        let scale = (wanted / size.pixels()).sqrt();
+        // Pixels of a picture as small are as wide, and err as much; of fewer, few tell little.
+        let most = if gpu.info().kind == DeviceKind::Cpu { PIXELS } else { PIXELS_OF_GPUS };
+        let scale = (size.pixels().clamp(FEWEST_PIXELS, most) / size.pixels()).sqrt();
         let side = |side: u32| (f64::from(side) * scale).round().clamp(1.0, f64::from(gpu.max_image_side())) as u32;
         let small = Size { width: side(size.width), height: side(size.height) };
         let pixels = size.pixels() / small.pixels();
