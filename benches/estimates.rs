@@ -1,5 +1,6 @@
 //! What `--tolerance` promises, held against the true error on ten scenes: `cargo bench --bench estimates` prints the table of
-//! docs/auto.md. Arguments choose tolerances, as `-- 0.1 0.01`; without any it takes all three, which is hours.
+//! docs/auto.md. Arguments choose tolerances, and scenes by a part of their names, as
+//! `-- 0.1 0.01 ball`; without any it takes all of them, which is hours.
 //!
 //! What is counted are the pixels, each channel for itself, whose |x - r| / (r + 0.1) is below the tolerance. `tree` promises what it
 //! cuts off: r is the same samples followed on and on. `path` promises what its samples scatter: r is another picture of it, and the
@@ -143,12 +144,15 @@ fn main() -> Result<()> {
     if tolerances.is_empty() {
         tolerances = vec![1e-1, 1e-2, 1e-3];
     }
+    let is_name = |argument: &String| !argument.starts_with('-') && argument.parse::<f64>().is_err();
+    let names: Vec<_> = std::env::args().skip(1).filter(is_name).collect();
     let wanted = std::env::var("VITRUM_DEVICE").ok();
     let instance = Instance::new(/* validation: */ false)?;
     let bench = Bench { gpu: Gpu::open(&instance, instance.choose(wanted.as_deref())?)? };
     println!("| scene | tolerance | `tree` | `path` (samples) | `auto` (chosen, samples) |");
     println!("| --- | --- | --- | --- | --- |");
-    for (name, mut scene) in scenes()? {
+    let is_wanted = |name: &str| names.is_empty() || names.iter().any(|part| name.contains(part));
+    for (name, mut scene) in scenes()?.into_iter().filter(|(name, _)| is_wanted(name)) {
         for &tolerance in &tolerances {
             // Samples grow with the square of what is asked: the pictures shrink.
             let (width, height) = if tolerance < 5e-3 { (16, 12) } else { (32, 24) };

@@ -198,7 +198,8 @@ TEXT
     exit 1
 fi
 
-install build-essential pkg-config ca-certificates libvulkan1 vulkan-validationlayers xvfb
+install build-essential pkg-config ca-certificates libvulkan1 vulkan-validationlayers xvfb \
+    libx11-6 libx11-xcb1 libxcursor1 libxi6 libxkbcommon-x11-0
 install_lavapipe
 install_rust
 install_shaderc

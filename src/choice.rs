@@ -42,7 +42,7 @@ const EDGES: f64 = 0.65;
 
 /// How much larger than the pilots say the error of samples may be: they are few pixels. `path` looks for itself, and is held to a
 /// little more than the tolerance says.
-const MARGIN: f64 = 1.4;
+const MARGIN: f64 = 1.6;
 const MARGIN_OF_PATH: f64 = 1.1;
 
 /// The share of the error that may be what is cut off.

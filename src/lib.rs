@@ -33,5 +33,6 @@ pub mod passes;
 pub mod plan;
 pub mod report;
 pub mod scene;
+pub mod viewer;
 
 pub use error::{Error, Result};

@@ -6,6 +6,7 @@ mod devices;
 mod explain;
 mod numerics;
 mod render;
+mod view;
 
 use std::error::Error as _;
 use std::io::{IsTerminal, Write};
@@ -36,6 +37,8 @@ struct Cli {
 enum Command {
     /// Renders one image, off screen
     Render(Box<render::RenderCommand>),
+    /// Shows a scene in a window, its glass in one's hands
+    View(Box<view::ViewCommand>),
     /// Tells which effects a scene calls for and which not, and what each model makes of them
     Explain(explain::ExplainCommand),
     /// Measures what accuracy costs in time, for one scene
@@ -119,6 +122,7 @@ pub fn main() -> ExitCode {
     };
     let result = match cli.command {
         Command::Render(command) => command.run(cli.talk),
+        Command::View(command) => command.run(cli.talk),
         Command::Explain(command) => command.run(),
         Command::Cost(command) => command.run(cli.talk),
         Command::Compare(command) => command.run(cli.talk),

@@ -1,7 +1,8 @@
 //! Recording, submitting, waiting and timing.
 
 use std::marker::PhantomData;
-use std::sync::PoisonError;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, PoisonError};
 
 use ash::vk;
 use bytemuck::NoUninit;
@@ -44,6 +45,8 @@ pub struct Commands {
     pub(super) buffer: vk::CommandBuffer,
     fence: vk::Fence,
     queries: vk::QueryPool,
+    /// What is set ends the work: nothing more is submitted.
+    interrupt: Option<Arc<AtomicBool>>,
     gpu: Gpu,
 }
 
@@ -55,6 +58,7 @@ impl Commands {
             buffer: vk::CommandBuffer::null(),
             fence: vk::Fence::null(),
             queries: vk::QueryPool::null(),
+            interrupt: None,
             gpu: gpu.clone(),
         };
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.info().queue_family);
@@ -71,6 +75,11 @@ impl Commands {
         Ok(commands)
     }
 
+    /// From now on nothing is submitted while `interrupt` is set: [`GpuError::Interrupted`].
+    pub fn interrupt_by(&mut self, interrupt: Arc<AtomicBool>) {
+        self.interrupt = Some(interrupt);
+    }
+
     /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
@@ -80,6 +89,9 @@ impl Commands {
     ///
     /// What is recorded is borrowed for `'r`, which outlives this call.
     pub fn run<'r>(&mut self, record: impl FnOnce(&mut Recorder<'_, 'r>)) -> Result<Vec<PassTime>> {
+        if self.interrupt.as_ref().is_some_and(|interrupt| interrupt.load(Ordering::Relaxed)) {
+            return Err(GpuError::Interrupted);
+        }
         let device = &self.gpu.device;
         let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
         // SAFETY: the last submission was waited for, so pool, buffer and queries are free.

@@ -30,7 +30,7 @@ pub struct Open {
     names: Option<ext::debug_utils::Device>,
     info: DeviceInfo,
     /// Held so that it outlives the device.
-    _instance: Arc<Instance>,
+    pub(super) instance: Arc<Instance>,
 }
 
 impl Deref for Gpu {
@@ -58,6 +58,9 @@ impl Gpu {
         const PORTABILITY: &CStr = ash::khr::portability_subset::NAME;
         let subset = extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(PORTABILITY));
         let mut enabled = if subset { vec![PORTABILITY.as_ptr()] } else { Vec::new() };
+        if instance.shows() && extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(khr::swapchain::NAME)) {
+            enabled.push(khr::swapchain::NAME.as_ptr());
+        }
         let mut vulkan12 = vk::PhysicalDeviceVulkan12Features::default().buffer_device_address(true);
         let mut acceleration =
             vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
@@ -101,7 +104,7 @@ impl Gpu {
             acceleration,
             names,
             info,
-            _instance: Arc::clone(instance),
+            instance: Arc::clone(instance),
         })))
     }
 

@@ -35,6 +35,25 @@ pub enum GpuError {
         missing: Vec<String>,
     },
 
+    /// There is no window system, or nothing can be shown in it.
+    #[error("no window: {0}; vitrum render needs none")]
+    NoWindow(String),
+
+    /// The device cannot show pictures in this window.
+    #[error("device {name:?} cannot show pictures in this window; choose another with --device (see vitrum devices)")]
+    CannotShow {
+        /// The device.
+        name: String,
+    },
+
+    /// What the user interface is drawn with.
+    #[error("drawing the user interface: {0}")]
+    Interface(String),
+
+    /// What was being done is not wanted any more.
+    #[error("interrupted")]
+    Interrupted,
+
     /// No device of that name or index.
     #[error("no Vulkan device {wanted:?}; found: {}", .found.join(", "))]
     UnknownDevice {

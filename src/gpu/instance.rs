@@ -1,10 +1,11 @@
 //! The Vulkan instance: which devices there are, and what the validation layer says.
 
-use std::ffi::{CStr, c_void};
+use std::ffi::{CStr, c_char, c_void};
 use std::fmt;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use ash::{ext, vk};
+use winit::raw_window_handle::HasDisplayHandle;
 
 use super::error::Context;
 use super::{GpuError, Result};
@@ -44,8 +45,9 @@ pub struct Instance {
     pub(super) handle: ash::Instance,
     debug: Option<(ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
     messages: Arc<Messages>,
+    shows: bool,
     // Last: the functions of everything above live in its library.
-    _entry: ash::Entry,
+    pub(super) entry: ash::Entry,
 }
 
 /// What kind of device it is, from the fastest to the slowest expected.
@@ -117,6 +119,18 @@ pub struct DeviceInfo {
 impl Instance {
     /// Opens the loader; with `validation`, under the validation layer with synchronization validation.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
+        Self::with_extensions(validation, &[])
+    }
+
+    /// The same, able to show pictures in windows of `display`.
+    pub fn for_windows(validation: bool, display: &impl HasDisplayHandle) -> Result<Arc<Self>> {
+        let display = display.display_handle().map_err(|error| GpuError::NoWindow(error.to_string()))?;
+        let extensions = ash_window::enumerate_required_extensions(display.as_raw())
+            .map_err(|result| GpuError::NoWindow(format!("Vulkan has no windows here: {result}")))?;
+        Self::with_extensions(validation, extensions)
+    }
+
+    fn with_extensions(validation: bool, wanted: &[*const c_char]) -> Result<Arc<Self>> {
         // SAFETY: the loader is the system's own library; its initialisers are those of every Vulkan program.
         let entry = unsafe { ash::Entry::load() }.map_err(GpuError::NoLoader)?;
         // SAFETY: no arguments.
@@ -131,7 +145,7 @@ impl Instance {
             .application_name(c"vitrum")
             .engine_name(c"vitrum")
             .api_version(vk::API_VERSION_1_3);
-        let mut extensions = Vec::new();
+        let mut extensions = wanted.to_vec();
         // SAFETY: no layer is named.
         let available = unsafe { entry.enumerate_instance_extension_properties(None) }
             .context("vkEnumerateInstanceExtensionProperties")?;
@@ -163,15 +177,18 @@ impl Instance {
             info = info.flags(vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR);
         }
         let info = info.enabled_layer_names(&layers).enabled_extension_names(&extensions);
-        // SAFETY: every pointer in `info` is to a local that outlives the call.
+        // SAFETY: every pointer in `info` is to a local that outlives the call, or to a constant.
         let handle = unsafe { entry.create_instance(&info, None) }.map_err(|result| match result {
+            vk::Result::ERROR_EXTENSION_NOT_PRESENT if !wanted.is_empty() => {
+                GpuError::NoWindow("no driver here shows pictures in windows".into())
+            }
             vk::Result::ERROR_INCOMPATIBLE_DRIVER => GpuError::NoDevice,
             result => GpuError::Call { call: "vkCreateInstance", result },
         })?;
 
-        let mut instance = Self { handle, debug: None, messages, _entry: entry };
+        let mut instance = Self { handle, debug: None, messages, shows: !wanted.is_empty(), entry };
         if validation {
-            let debug = ext::debug_utils::Instance::new(&instance._entry, &instance.handle);
+            let debug = ext::debug_utils::Instance::new(&instance.entry, &instance.handle);
             let info = messenger_info(&instance.messages);
             // SAFETY: the callback's user data is the `Messages` that this instance holds until it is destroyed.
             let messenger =
@@ -184,6 +201,11 @@ impl Instance {
     /// What the validation layer says; it outlives the instance, so that messages of its end are seen too.
     pub fn messages(&self) -> Arc<Messages> {
         Arc::clone(&self.messages)
+    }
+
+    /// Whether it was made for windows.
+    pub(super) fn shows(&self) -> bool {
+        self.shows
     }
 
     pub(super) fn validates(&self) -> bool {

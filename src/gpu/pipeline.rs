@@ -26,6 +26,13 @@ pub struct Specialization {
     values: Vec<u8>,
 }
 
+impl PartialEq for Specialization {
+    fn eq(&self, other: &Self) -> bool {
+        let ids = |all: &Self| all.entries.iter().map(|entry| (entry.constant_id, entry.offset)).collect::<Vec<_>>();
+        self.values == other.values && ids(self) == ids(other)
+    }
+}
+
 impl Specialization {
     /// One constant an effect, as in `shaders/effects.glsl`; ids that a shader does not have are ignored.
     pub fn effects(effects: Effects) -> Self {

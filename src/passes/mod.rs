@@ -25,6 +25,7 @@ mod tree;
 mod view;
 
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use crate::gpu::{
@@ -128,6 +129,7 @@ pub struct Renderer {
     commands: Commands,
     resources: Resources,
     passes: Passes,
+    model: Model,
     trace: Option<Trace>,
     upload: Duration,
     set_up: Duration,
@@ -143,7 +145,58 @@ impl Renderer {
         let resources = Resources::new(&mut commands, scene, plan, trace)?;
         let upload = start.elapsed();
         let passes = Passes::new(&mut commands, &resources, plan, trace)?;
-        Ok(Self { commands, resources, passes, trace, upload, set_up: start.elapsed() })
+        Ok(Self { commands, resources, passes, model: plan.model, trace, upload, set_up: start.elapsed() })
+    }
+
+    /// From now on nothing is submitted while `interrupt` is set; what is under way ends with [`GpuError::Interrupted`].
+    pub fn interrupt_by(&mut self, interrupt: Arc<AtomicBool>) {
+        self.commands.interrupt_by(interrupt);
+    }
+
+    /// Another scene or plan. Passes stay where they are the same.
+    pub fn change(&mut self, scene: &Scene, plan: &Plan) -> crate::Result<()> {
+        let gpu = self.commands.gpu().clone();
+        check(&gpu, plan)?;
+        let trace = trace_of(&gpu, plan)?;
+        let resources = Resources::new(&mut self.commands, scene, plan, trace)?;
+        let same = (plan.model, trace) == (self.model, self.trace)
+            && resources.specialization == self.resources.specialization
+            && resources.opaque == self.resources.opaque;
+        if !same {
+            self.passes = Passes::new(&mut self.commands, &resources, plan, trace)?;
+        }
+        (self.resources, self.model, self.trace) = (resources, plan.model, trace);
+        Ok(())
+    }
+
+    /// Begins a picture that grows round by round; the plan is that of the last change.
+    pub fn begin(&self, plan: &Plan) -> crate::Result<Refinement> {
+        Ok(Refinement {
+            targets: Targets::new(self.commands.gpu(), plan.size, &self.resources, plan.model)?,
+            rounds: sampling::rounds(plan),
+            plan: plan.clone(),
+            samples: 0,
+            times: Times::default(),
+        })
+    }
+
+    /// One round more; false where there was none.
+    pub fn advance(&mut self, picture: &mut Refinement) -> crate::Result<bool> {
+        let Some(round) = picture.rounds.next() else { return Ok(false) };
+        let (resources, targets) = (&self.resources, &picture.targets);
+        let nothing = &mut |_: &mut Commands, _| Ok(());
+        let times =
+            self.passes.sample(&mut self.commands, resources, targets, &resources.draws, round.push, nothing)?;
+        picture.times.add(times);
+        picture.samples += round.samples;
+        Ok(true)
+    }
+
+    /// What a screen shows of the picture, after a round at least.
+    pub fn display(&mut self, picture: &mut Refinement) -> crate::Result<Vec<[u8; 4]>> {
+        let (pixels, times) = self.passes.display.run(&mut self.commands, &picture.targets, &picture.plan)?;
+        picture.times.add(times);
+        Ok(pixels)
     }
 
     /// The next render goes by `plan`, which differs from the one before in samples, seed, depth, cut-off and tolerance alone.
@@ -192,6 +245,27 @@ impl Renderer {
             resumed,
             warnings,
         })
+    }
+}
+
+/// A picture that grows.
+pub struct Refinement {
+    plan: Plan,
+    targets: Targets,
+    rounds: Box<dyn Iterator<Item = Round>>,
+    samples: u32,
+    times: Times,
+}
+
+impl Refinement {
+    /// Samples per pixel so far.
+    pub fn samples(&self) -> u32 {
+        self.samples
+    }
+
+    /// Device time of each pass so far.
+    pub fn passes(&self) -> &[PassTime] {
+        &self.times.0
     }
 }
 
