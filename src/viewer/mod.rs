@@ -1,6 +1,6 @@
 //! The desktop viewer: a window in which a scene is seen from all sides, and its glass changed.
 //!
-//! [`App`] takes events and draws; [`worker`] renders on a thread of its own; [`panels`] are the windows within the window. What is on the
+//! `App` takes events and draws; `worker` renders on a thread of its own; `panels` are the windows within the window. What is on the
 //! screen is what `vitrum render` makes of the same options, pixel for pixel.
 
 mod orbit;
