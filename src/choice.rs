@@ -11,6 +11,7 @@
 use std::f64::consts::SQRT_2;
 use std::time::{Duration, Instant};
 
+use crate::cost::mean;
 use crate::gpu::{DeviceKind, Gpu};
 use crate::options::{MOST_SAMPLES, Model, RenderArgs, Size};
 use crate::passes::{self, MOST_PIXELS, Rendered, Renderer};
@@ -342,7 +343,7 @@ impl<'a> Pilots<'a> {
         }
         let (second, time) = picture(samples, 0x5eed_0002)?;
         let ms = self.ms(&second, time);
-        let truth: Vec<_> = first.radiance.iter().zip(&second.radiance).map(mean).collect();
+        let truth = mean(&first.radiance, &second.radiance);
         // The difference of two has twice the variance of one.
         let error = self.most(differences(&first.radiance, &second.radiance)) / SQRT_2;
         let spread = error * f64::from(samples).sqrt();
@@ -368,16 +369,16 @@ impl<'a> Pilots<'a> {
             return self.inexact(renderer, args.clone());
         }
         let (spread, power) = self.spread(&mut renderer, args)?;
-        let mut before: Option<(RenderArgs, Rendered, f64)> = None;
+        let mut before: Option<(RenderArgs, Vec<[f32; 3]>, f64)> = None;
         for args in rungs {
             let plan = self.plan(&args, FEW, 0)?;
             renderer.set_limits(&plan)?;
             let start = Instant::now();
             let rendered = renderer.render(&plan, &mut |_| {})?;
-            let (host, ms) = (start.elapsed(), self.ms(&rendered, start.elapsed()));
-            let before_it = before.replace((args, rendered.clone(), ms));
-            let Some((args, coarse, ms)) = before_it else { continue };
-            let floor = self.most(errors(&coarse.radiance, &rendered.radiance));
+            let host = start.elapsed();
+            let (ms, finer) = (self.ms(&rendered, host), rendered.radiance);
+            let Some((args, coarse, ms)) = before.replace((args, finer.clone(), ms)) else { continue };
+            let floor = self.most(errors(&coarse, &finer));
             self.laws.push((args, Model::Tree, Law { floor, spread, power, margin: MARGIN, ms, lacks: 0 }));
             let is_enough = floor <= CUT_SHARE * self.goal.tolerance.unwrap_or(1e-3);
             if is_enough || host > LONG || !self.fits(Duration::ZERO) {
@@ -482,8 +483,4 @@ fn differences(a: &[[f32; 3]], b: &[[f32; 3]]) -> impl Iterator<Item = f64> {
 
 fn pairs(a: &[[f32; 3]], b: &[[f32; 3]]) -> impl Iterator<Item = (f64, f64)> {
     a.iter().flatten().zip(b.iter().flatten()).map(|(&a, &b)| (f64::from(a), f64::from(b)))
-}
-
-fn mean((a, b): (&[f32; 3], &[f32; 3])) -> [f32; 3] {
-    std::array::from_fn(|i| a[i].midpoint(b[i]))
 }

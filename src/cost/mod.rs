@@ -11,6 +11,7 @@ use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
 pub use error::Estimate;
+pub(crate) use error::mean;
 pub use settings::{Setting, settings};
 
 use xxhash_rust::xxh3::xxh3_64;

@@ -57,7 +57,8 @@ struct Swapchain {
 pub struct Surface {
     handle: vk::SurfaceKHR,
     surfaces: khr::surface::Instance,
-    instance: Arc<Instance>,
+    /// Both are held so that they outlive the surface.
+    _instance: Arc<Instance>,
     window: Arc<Window>,
 }
 
@@ -75,7 +76,7 @@ impl Surface {
         let handle = unsafe { ash_window::create_surface(&instance.entry, &instance.handle, display, handle, None) }
             .context("vkCreateSurfaceKHR")?;
         let surfaces = khr::surface::Instance::new(&instance.entry, &instance.handle);
-        Ok(Self { handle, surfaces, instance: instance.clone(), window: window.clone() })
+        Ok(Self { handle, surfaces, _instance: instance.clone(), window: window.clone() })
     }
 
     /// Whether `device` can show pictures here.
@@ -92,7 +93,6 @@ impl Drop for Surface {
     fn drop(&mut self) {
         // SAFETY: null where a screen has taken it over; else nothing was made from it.
         unsafe { self.surfaces.destroy_surface(self.handle, None) };
-        let _ = (&self.instance, &self.window);
     }
 }
 

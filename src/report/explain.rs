@@ -5,7 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 
-use super::stats::{CandidateRow, Outcome};
+use super::plan::PlanRow;
 use crate::Result;
 use crate::choice::Choice;
 use crate::effects::{Caller, Effect};
@@ -35,20 +35,6 @@ pub struct Explanation {
     pub touching: Vec<TouchRow>,
     pub warnings: Vec<String>,
     pub plan: Option<PlanRow>,
-}
-
-/// What `--model auto` would render, on a device.
-#[derive(Clone, Debug, Serialize)]
-#[allow(missing_docs, reason = "docs/explain.md describes the members")]
-pub struct PlanRow {
-    pub device: String,
-    pub size: [u32; 2],
-    pub tolerance: Option<f64>,
-    pub time_budget: Option<f64>,
-    pub is_expected: bool,
-    pub unmeasured: Option<&'static str>,
-    pub best: CandidateRow,
-    pub others: Vec<CandidateRow>,
 }
 
 /// How much there is of what.
@@ -167,16 +153,7 @@ impl Explanation {
     /// The same with what `choice` found for a picture of `size` on a device.
     #[must_use]
     pub fn with_plan(self, device: &str, size: Size, choice: &Choice) -> Self {
-        let plan = PlanRow {
-            device: device.into(),
-            size: [size.width, size.height],
-            tolerance: choice.goal.tolerance,
-            time_budget: choice.goal.seconds,
-            is_expected: choice.is_expected,
-            unmeasured: choice.unmeasured,
-            best: CandidateRow::new(&choice.best),
-            others: choice.others.iter().map(CandidateRow::new).collect(),
-        };
+        let plan = PlanRow::new(device, size, choice);
         Self { plan: Some(plan), ..self }
     }
 
@@ -184,42 +161,6 @@ impl Explanation {
     pub fn json(&self) -> String {
         // Plain numbers, strings and lists: nothing that could fail.
         serde_json::to_string_pretty(self).unwrap_or_default() + "\n"
-    }
-}
-
-impl PlanRow {
-    /// What is asked for, in words.
-    fn goal(&self) -> String {
-        let asked = [
-            self.tolerance.map(|x| format!("--tolerance {x}")),
-            self.time_budget.map(|x| format!("--time-budget {x}")),
-        ];
-        asked.into_iter().flatten().collect::<Vec<_>>().join(" ")
-    }
-}
-
-impl fmt::Display for PlanRow {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let [width, height] = self.size;
-        writeln!(f, "\nPlan for {}, {width}x{height} on {}", self.goal(), self.device)?;
-        for (i, row) in [&self.best].into_iter().chain(&self.others).enumerate() {
-            let Outcome { samples, gpu_ms, error } = row.expected;
-            let expected = match (gpu_ms, error, samples) {
-                (Some(ms), Some(error), Some(samples)) => {
-                    format!(
-                        "{:.2} s, {}, 95 % of the pixels within {error:.1e}",
-                        ms * 1e-3,
-                        counted(samples as usize, "sample")
-                    )
-                }
-                _ => format!("by the effects of the scene: {}", self.unmeasured.unwrap_or_default()),
-            };
-            writeln!(f, "{} {:<48} {expected}", if i == 0 { '*' } else { ' ' }, row.options)?;
-        }
-        if !self.is_expected && self.unmeasured.is_none() {
-            writeln!(f, "  nothing is expected to keep that; the first comes closest")?;
-        }
-        Ok(())
     }
 }
 
@@ -377,7 +318,7 @@ fn listed(names: &[&str]) -> String {
     if lines.is_empty() { "nothing".into() } else { lines.join(&format!(",\n{:24}", "")) }
 }
 
-fn counted(count: usize, one: &str) -> String {
+pub(super) fn counted(count: usize, one: &str) -> String {
     match count {
         0 => format!("no {one}s"),
         1 => format!("1 {one}"),

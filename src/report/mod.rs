@@ -6,6 +6,7 @@ mod cost_page;
 mod explain;
 mod numerics;
 mod numerics_page;
+mod plan;
 mod plots;
 mod stats;
 

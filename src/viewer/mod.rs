@@ -57,7 +57,7 @@ struct State {
     args: RenderArgs,
     /// Whether the size was given; else it is the window's.
     sized: bool,
-    /// What went wrong last, until something goes right.
+    /// What went wrong last, until something else is asked for.
     error: Option<String>,
     picture: Option<Picture>,
 }
@@ -70,18 +70,19 @@ impl State {
         Ok(Self { path, sized: args.size.is_some(), scene, args, error: None, picture: None })
     }
 
-    /// Another scene in the place of this one; what cannot be read leaves it.
-    fn open(&mut self, path: PathBuf) {
+    /// Another scene in the place of this one; what cannot be read leaves it, and is said.
+    fn open(&mut self, path: PathBuf) -> bool {
         let args = RenderArgs { ior: None, roughness: None, env: None, size: None, ..self.args.clone() };
         let size = self.args.size.filter(|_| self.sized);
         match Self::new(Options { scene: Some(path), args: RenderArgs { size, ..args } }) {
             Ok(state) => *self = Self { picture: self.picture.take(), ..state },
             Err(error) => self.error = Some(error.in_full()),
         }
+        self.error.is_none()
     }
 
-    /// Another environment.
-    fn surround(&mut self, path: PathBuf) {
+    /// Another environment, if it can be read.
+    fn surround(&mut self, path: PathBuf) -> bool {
         let overrides = Overrides { environment: Some(path.clone()), ..Overrides::default() };
         match Scene::load(self.path.as_deref(), &overrides) {
             Ok(scene) => {
@@ -91,6 +92,7 @@ impl State {
             }
             Err(error) => self.error = Some(error.in_full()),
         }
+        self.error.is_none()
     }
 
     fn size(&self) -> Size {
@@ -162,10 +164,9 @@ impl App {
                     }
                 }
                 self.state.picture = Some(picture);
-                self.state.error = None;
             }
             Some(News::Failed(error)) => self.state.error = Some(error),
-            Some(News::Lost(error)) => return Err(Error::Usage(error)),
+            Some(News::Lost) => return Err(Error::Gpu(GpuError::Lost)),
             None => {}
         }
         let input = shown.egui.take_egui_input(&shown.window);
@@ -174,14 +175,18 @@ impl App {
         let mut changes = false;
         for path in dropped {
             let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-            match extension.as_deref() {
+            changes |= match extension.as_deref() {
                 Some("exr" | "hdr" | "png" | "jpg" | "jpeg") => state.surround(path),
                 _ => state.open(path),
-            }
-            changes = true;
+            };
         }
         let context = shown.egui.egui_ctx().clone();
-        let output = context.run_ui(input, |ui| changes |= panels::all(ui, state, texture));
+        let mut edits = false;
+        let output = context.run_ui(input, |ui| edits |= panels::all(ui, state, texture));
+        if edits {
+            state.error = None;
+            changes = true;
+        }
         shown.egui.handle_platform_output(&shown.window, output.platform_output);
         shown.screen.set_textures(output.textures_delta)?;
         self.closes = context.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Q));

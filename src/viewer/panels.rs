@@ -1,7 +1,8 @@
 //! The windows within the window. Each says whether it changed anything that a picture shows.
 
 use egui::{
-    Align2, Color32, ComboBox, DragValue, Rect, Response, RichText, Slider, TextureHandle, Ui, Window, pos2, vec2,
+    Align2, Color32, ComboBox, DragValue, Rect, Response, RichText, Slider, SliderClamping, TextureHandle, Ui, Window,
+    pos2, vec2,
 };
 
 use super::{State, heights, orbit};
@@ -91,7 +92,9 @@ fn camera(ui: &Ui, response: &Response, state: &mut State, height: f32) -> bool 
 
 fn slider(ui: &mut Ui, name: &str, value: &mut f64, range: std::ops::RangeInclusive<f64>) -> bool {
     ui.label(name);
-    let changed = ui.add(Slider::new(value, range).max_decimals(3)).changed();
+    // What a scene has beyond the slider's ends stays until it is moved.
+    let slider = Slider::new(value, range).max_decimals(3).clamping(SliderClamping::Edits);
+    let changed = ui.add(slider).changed();
     ui.end_row();
     changed
 }

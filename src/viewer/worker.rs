@@ -60,7 +60,7 @@ pub(super) enum News {
     /// The picture that was wanted cannot be made.
     Failed(String),
     /// The device is gone.
-    Lost(String),
+    Lost,
 }
 
 #[derive(Default)]
@@ -173,7 +173,7 @@ impl Work {
         while let Some(wanted) = self.next() {
             let news = match self.make(&wanted) {
                 Ok(()) | Err(Error::Gpu(GpuError::Interrupted)) => continue,
-                Err(error @ Error::Gpu(GpuError::Lost)) => News::Lost(error.in_full()),
+                Err(Error::Gpu(GpuError::Lost)) => News::Lost,
                 Err(error) => News::Failed(error.in_full()),
             };
             // What is half made is not trusted.
