@@ -67,7 +67,7 @@ fn bodies() -> Result<Vec<(&'static str, Scene)>, Box<dyn Error>> {
     let built_in = Scene::load(None, &Overrides::default())?;
     let asset = |name: &str| -> Result<vitrum::scene::Mesh, Box<dyn Error>> {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/meshes").join(name);
-        Ok(Scene::load(Some(&path), &Overrides::default())?.meshes.swap_remove(0))
+        Ok(Scene::load(Some(&path), &Overrides::default())?.meshes[0].as_ref().clone())
     };
     let ball = |glass: Dielectric| Part::of(icosphere(5), Surface::Dielectric(glass));
     let absorbing =

@@ -394,6 +394,8 @@ impl fmt::Display for Selection {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
+
     use glam::DVec3;
 
     use super::*;
@@ -499,7 +501,7 @@ mod tests {
         check(&scene, Effect::Shadows, &[Caller::Light(0)]);
         scene.objects.remove(2);
         check(&scene, Effect::Nesting, &[]);
-        scene.meshes[1].overlaps = true;
+        Arc::make_mut(&mut scene.meshes[1]).overlaps = true;
         check(&scene, Effect::Nesting, &[Caller::Parts(1)]);
         scene.camera.position = scene.bounds_of(&scene.objects[0]).center();
         check(&scene, Effect::Nesting, &[Caller::Camera(0), Caller::Parts(1)]);

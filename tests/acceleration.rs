@@ -12,7 +12,7 @@ use glam::{DAffine3, DQuat, DVec3, Vec3};
 use common::Validated;
 use vitrum::gpu::{
     AccelerationStructure, Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, GpuError,
-    PlacedMesh, Result, Specialization, shaders,
+    MeshStructures, PlacedMesh, Result, Specialization, shaders,
 };
 
 /// `Ray` of `shaders/probe_ray_query.comp`.
@@ -70,11 +70,22 @@ fn validated() -> Option<Validated> {
     Some(validated)
 }
 
+/// Both levels.
+fn structure(
+    commands: &mut Commands,
+    corners: &Buffer,
+    meshes: &[Range<u32>],
+    placed: &[PlacedMesh],
+) -> Result<AccelerationStructure> {
+    let meshes = Arc::new(MeshStructures::new(commands, corners, meshes)?);
+    AccelerationStructure::new(commands, &meshes, placed)
+}
+
 /// What each ray meets, in the eyes of the device.
 fn trace(commands: &mut Commands, placed: &[PlacedMesh], rays: &[Ray]) -> Result<Vec<Hit>> {
     let gpu = commands.gpu().clone();
     let corners = commands.upload_buffer("corners", &padded())?;
-    let scene = AccelerationStructure::new(commands, &corners, &MESHES, placed)?;
+    let scene = structure(commands, &corners, &MESHES, placed)?;
     drop(corners);
     let size = size_of_val(rays) as u64 / size_of::<Ray>() as u64 * size_of::<Hit>() as u64;
     let hits = Arc::new(Buffer::new(&gpu, &BufferDesc { name: "hits", size, usage: BufferUse::Storage })?);
@@ -207,7 +218,7 @@ fn a_scene_without_meshes_is_met_by_no_ray() {
     let rays = [Ray::new([2.25, 0.25, 5.0], [0.0, 0.0, -1.0]); 3];
     assert_eq!(trace(&mut commands, &[], &rays).expect("the probe runs"), [MISS; 3]);
     let nothing = commands.upload_buffer::<f32>("no corners", &[]).expect("upload");
-    AccelerationStructure::new(&mut commands, &nothing, &[], &[]).expect("an empty scene");
+    structure(&mut commands, &nothing, &[], &[]).expect("an empty scene");
     drop((nothing, commands));
     validated.verdict();
 }
@@ -218,7 +229,7 @@ fn what_cannot_be_traced_is_refused() {
     let mut commands = Commands::new(&validated.gpu).expect("commands");
     let corners = commands.upload_buffer("corners", &padded()).expect("upload");
     if !validated.gpu.ray_query() {
-        let refusal = AccelerationStructure::new(&mut commands, &corners, &MESHES, &scene()).err();
+        let refusal = structure(&mut commands, &corners, &MESHES, &scene()).err();
         assert!(
             matches!(&refusal, Some(GpuError::Lacking { missing, .. }) if missing == &["ray queries"]),
             "{refusal:?}"
@@ -228,7 +239,7 @@ fn what_cannot_be_traced_is_refused() {
     } else {
         let placed = PlacedMesh { mesh: QUAD, object_to_world: DAffine3::IDENTITY };
         let mut panics = |meshes: &[Range<u32>], placed: &[PlacedMesh]| {
-            let build = || AccelerationStructure::new(&mut commands, &corners, meshes, placed).map(drop);
+            let build = || structure(&mut commands, &corners, meshes, placed).map(drop);
             std::panic::catch_unwind(std::panic::AssertUnwindSafe(build)).is_err()
         };
         assert!(panics(&[0..4, 4..7], &[]), "a mesh beyond the corners");

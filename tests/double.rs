@@ -65,7 +65,7 @@ fn built_in() -> Scene {
 
 fn hollow_ball() -> Scene {
     let mut scene = ball(1.5);
-    scene.meshes[0] = shapes::hollow_ball(4, 0.1);
+    scene.meshes[0] = shapes::hollow_ball(4, 0.1).into();
     scene
 }
 

@@ -267,7 +267,8 @@ fn check(scene: &Scene) {
             assert!(opaque.base_color_texture.is_none_or(|texture| texture < scene.textures.len()));
         }
     }
-    for Texture { width, height, texels, .. } in &scene.textures {
+    for texture in &scene.textures {
+        let Texture { width, height, texels, .. } = texture.as_ref();
         let count = match texels {
             Texels::Srgb(texels) => texels.len(),
             Texels::Linear(texels) => texels.len(),

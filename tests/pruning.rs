@@ -175,7 +175,7 @@ impl Random {
             rotation: self.number(0.0, 6.0),
             visible: self.0.bool(),
         };
-        made.textures.push(texture);
+        made.textures.push(texture.into());
         if kind.nested && self.0.u32(..4) == 0 {
             made.camera.position = self.point(0.3);
             made.camera.target = DVec3::new(0.1, 0.2, -3.0);

@@ -1,12 +1,13 @@
 //! Acceleration structures: what ray queries in shaders look into.
 //!
 //! In flow the corners of triangles in a [`Buffer`], the meshes that they make and where those are placed; out flows
-//! an [`AccelerationStructure`] of two levels, for a [`Bind`](super::Bind). Its bottom level has one structure a
-//! mesh, in the mesh's own space, its top level one entry a placed mesh. Both are made once, for being traced fast,
-//! and never change.
+//! an [`AccelerationStructure`] of two levels, for a [`Bind`](super::Bind). Its bottom level, [`MeshStructures`], has
+//! one structure a mesh, in the mesh's own space, and several top levels may share it; the top level has one entry a
+//! placed mesh. Both are made once, for being traced fast, and never change.
 
 use std::ops::Range;
 use std::slice;
+use std::sync::Arc;
 
 use ash::{khr, vk};
 use bytemuck::{Pod, Zeroable};
@@ -42,64 +43,78 @@ pub struct PlacedMesh {
 pub struct AccelerationStructure {
     // First: it refers to the meshes.
     top: Level,
-    _meshes: Vec<Level>,
+    _meshes: Arc<MeshStructures>,
 }
 
-impl AccelerationStructure {
-    /// Builds both levels and waits for them.
+/// One structure for each of some meshes.
+pub struct MeshStructures(Vec<Level>);
+
+impl MeshStructures {
+    /// Builds them and waits for them.
     ///
     /// `corners` is a [storage buffer](BufferUse::Storage) of triangles, twelve 32-bit floats each; a mesh is a range
-    /// of them. The buffer is not needed afterwards. Meshes without triangles and scenes without meshes are met by no
-    /// ray.
+    /// of them. The buffer is not needed afterwards. Meshes without triangles are met by no ray.
     ///
     /// # Panics
     ///
-    /// If `corners` is no storage buffer or does not hold all meshes, if a placed mesh is not in the list, or if its
-    /// placement cannot be inverted in 32 bits.
-    pub fn new(
-        commands: &mut Commands,
-        corners: &Buffer,
-        meshes: &[Range<u32>],
-        placed: &[PlacedMesh],
-    ) -> Result<Self> {
+    /// If `corners` is no storage buffer or does not hold all meshes.
+    pub fn new(commands: &mut Commands, corners: &Buffer, meshes: &[Range<u32>]) -> Result<Self> {
         let gpu = commands.gpu().clone();
         // Before a buffer's address is asked for.
         gpu.acceleration()?;
         let limits = gpu.info().acceleration;
-        let most = limits.instances.min(1 << NUMBER_BITS);
-        within("the scene", "placed meshes", placed.len() as u64, most, "place fewer objects")?;
-
-        let mut mesh_builds = Vec::with_capacity(meshes.len());
+        let mut builds = Vec::with_capacity(meshes.len());
         for mesh in meshes {
             within("a mesh", "triangles", mesh.len() as u64, limits.triangles, "use smaller meshes")?;
-            mesh_builds.push(Build::new(&gpu, "acceleration structure of a mesh", Input::mesh(corners, mesh))?);
+            builds.push(Build::new(&gpu, "acceleration structure of a mesh", Input::mesh(corners, mesh))?);
         }
+        build(commands, &builds)?;
+        Ok(Self(builds.into_iter().map(|build| build.level).collect()))
+    }
+}
+
+impl AccelerationStructure {
+    /// Builds the top level and waits for it. Scenes without meshes are met by no ray.
+    ///
+    /// # Panics
+    ///
+    /// If a placed mesh is not in the list, or if its placement cannot be inverted in 32 bits.
+    pub fn new(commands: &mut Commands, meshes: &Arc<MeshStructures>, placed: &[PlacedMesh]) -> Result<Self> {
+        let gpu = commands.gpu().clone();
+        let most = gpu.info().acceleration.instances.min(1 << NUMBER_BITS);
+        within("the scene", "placed meshes", placed.len() as u64, most, "place fewer objects")?;
         let entries: Vec<_> = (0..)
             .zip(placed)
-            .map(|(number, p)| Entry::new(number, p.object_to_world, mesh_builds[p.mesh].level.address()))
+            .map(|(number, p)| Entry::new(number, p.object_to_world, meshes.0[p.mesh].address()))
             .collect();
         let count = entries.len() as u32;
         let entries = commands.upload_buffer("placed meshes", &entries)?;
-        let scene_build = Build::new(&gpu, "acceleration structure of the scene", Input::scene(&entries, count))?;
-
-        // The scene's comes last: it reads the meshes' structures.
-        let builds = || mesh_builds.iter().chain([&scene_build]);
-        let scratch = Scratch::new(&gpu, builds().map(|build| build.scratch).max().unwrap_or(0))?;
-        commands.run(|cmd| {
-            cmd.memory_barrier(BUFFER_WRITES, BUILD_INPUT);
-            for build in builds() {
-                cmd.build(build, &scratch);
-                // The next one works in the same memory.
-                cmd.memory_barrier(BUILD, BUILD);
-            }
-            cmd.memory_barrier(BUILD, TRACE);
-        })?;
-        Ok(Self { top: scene_build.level, _meshes: mesh_builds.into_iter().map(|build| build.level).collect() })
+        let scene = Build::new(&gpu, "acceleration structure of the scene", Input::scene(&entries, count))?;
+        build(commands, slice::from_ref(&scene))?;
+        Ok(Self { top: scene.level, _meshes: meshes.clone() })
     }
 
     pub(super) fn handle(&self) -> vk::AccelerationStructureKHR {
         self.top.handle
     }
+}
+
+/// Makes what was prepared, one after the other.
+fn build(commands: &mut Commands, builds: &[Build<'_>]) -> Result<()> {
+    let gpu = commands.gpu().clone();
+    let scratch = Scratch::new(&gpu, builds.iter().map(|build| build.scratch).max().unwrap_or(0))?;
+    commands.run(|cmd| {
+        cmd.memory_barrier(BUFFER_WRITES, BUILD_INPUT);
+        // The top level reads what was built before.
+        cmd.memory_barrier(BUILD, BUILD);
+        for build in builds {
+            cmd.build(build, &scratch);
+            // The next one works in the same memory.
+            cmd.memory_barrier(BUILD, BUILD);
+        }
+        cmd.memory_barrier(BUILD, TRACE);
+    })?;
+    Ok(())
 }
 
 /// What a build does to the buffers that it is given.

@@ -19,7 +19,7 @@ mod screen;
 mod shader;
 mod shared;
 
-pub use acceleration::{AccelerationStructure, PlacedMesh};
+pub use acceleration::{AccelerationStructure, MeshStructures, PlacedMesh};
 pub use bind_group::{Bind, BindGroup};
 pub use commands::{Area, Commands, PassTime, Recorder, RenderPass, Shown, Sides, Target};
 pub use device::Gpu;

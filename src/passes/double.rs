@@ -6,7 +6,7 @@ use std::sync::Arc;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use super::geometry::{Draw, Geometry};
+use super::geometry::{Arrays, Draw, Geometry, Layout};
 use super::resources::Resources;
 use super::view::View;
 use super::{RADIANCE, Targets};
@@ -92,19 +92,17 @@ pub(super) struct Facet {
 
 impl Facet {
     /// All triangles, in their order.
-    pub(super) fn all(scene: &Scene, geometry: &Geometry) -> Vec<Self> {
-        let mut facets = Vec::with_capacity(geometry.triangles.len() / 3);
-        let mut first_vertex = 0;
-        for (mesh, triangles) in scene.meshes.iter().zip(&geometry.meshes) {
+    pub(super) fn all(layout: &Layout, arrays: &Arrays) -> Vec<Self> {
+        let mut facets = Vec::with_capacity(arrays.triangles.len() / 3);
+        for (first_vertex, triangles) in layout.spans() {
             let corner = |vertex: u32| {
-                let at = 3 * (first_vertex + vertex as usize);
-                DVec3::from_array(std::array::from_fn(|axis| f64::from(geometry.positions[at + axis])))
+                let at = 3 * (first_vertex + vertex) as usize;
+                DVec3::from_array(std::array::from_fn(|axis| f64::from(arrays.positions[at + axis])))
             };
             facets.extend(triangles.clone().map(|triangle| {
                 let at = 3 * triangle as usize;
-                Self::new(std::array::from_fn(|i| corner(geometry.triangles[at + i])))
+                Self::new(std::array::from_fn(|i| corner(arrays.triangles[at + i])))
             }));
-            first_vertex += mesh.positions.len();
         }
         facets
     }

@@ -1,7 +1,7 @@
 //! Surfaces that shine, as lights: a table that chooses triangles by how much light they send out. In flow a scene and its geometry, out
 //! flow words for `shaders/emitters.glsl`.
 
-use super::geometry::Geometry;
+use super::geometry::{Geometry, Layout};
 use crate::optics::spectrum::luminance;
 use crate::scene::{Scene, Surface};
 
@@ -16,18 +16,17 @@ fn header(count: u32, power: f32) -> Vec<u32> {
 }
 
 /// Each triangle that shines, with its share of the light: its luminance times its area.
-pub(super) fn table(scene: &Scene, geometry: &Geometry) -> Vec<u32> {
+pub(super) fn table(scene: &Scene, layout: &Layout, geometry: &Geometry) -> Vec<u32> {
     let mut shining = Vec::new();
-    for ((number, instance), &object) in (0..).zip(&geometry.instances).zip(&geometry.objects) {
+    for ((number, transform), &object) in (0..).zip(&geometry.transforms).zip(&geometry.objects) {
         let object = &scene.objects[object];
         let Surface::Opaque(opaque) = &scene.materials[object.material].surface else { continue };
         let brightness = luminance(opaque.emission);
         if brightness <= 0.0 {
             continue;
         }
-        let to_world = instance.object_to_world.linear();
-        for (triangle, place) in (0_u32..).zip(geometry.meshes[object.mesh].clone()) {
-            let [a, b, c] = geometry.corners_of(place).map(|corner| to_world * corner);
+        for triangle in 0..scene.meshes[object.mesh].triangles.len() as u32 {
+            let [a, b, c] = layout.corners_of(object.mesh, triangle).map(|corner| transform.matrix3 * corner);
             shining.push((brightness * 0.5 * (b - a).cross(c - a).length(), number, triangle));
         }
     }
@@ -82,16 +81,17 @@ mod tests {
         let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
         let view = View::new(&scene.camera, scene.bounds(), Size { width: 4, height: 3 });
         let shine = |emission| Surface::Opaque(Opaque { emission, ..Opaque::default() });
-        let geometry = |scene: &Scene| Geometry::new(scene, &view, Some(Trace::Software), /* opaque: */ true);
-        assert_eq!(table(&scene, &geometry(&scene)), none());
+        let (layout, _) = Layout::new(&scene, Some(Trace::Software));
+        let table = |scene: &Scene| table(scene, &layout, &Geometry::new(scene, &view, &layout, 0, /* opaque: */ true));
+        assert_eq!(table(&scene), none());
         scene.materials[0].surface = shine(DVec3::ZERO);
-        assert_eq!(table(&scene, &geometry(&scene)), none());
+        assert_eq!(table(&scene), none());
         scene.materials[0].surface = shine(DVec3::new(0.0, 0.0, 3.0));
-        let table = table(&scene, &geometry(&scene));
+        let bright = table(&scene);
         let count = scene.objects.iter().map(|object| scene.meshes[object.mesh].triangles.len()).sum::<usize>();
-        assert_eq!(table[0] as usize, count);
+        assert_eq!(bright[0] as usize, count);
         let mut end = 0.0;
-        for words in table[4..].chunks(4) {
+        for words in bright[4..].chunks(4) {
             let (start, share) = (f32::from_bits(words[0]), f32::from_bits(words[1]));
             assert!(start == end && share > 0.0, "{start} {share}");
             end = start + share;
@@ -102,7 +102,7 @@ mod tests {
         assert_eq!(shares(&[1.0]), [STEPS]);
         // Half of the light is not there if half of the brightness is not.
         scene.materials[0].surface = shine(DVec3::new(0.0, 0.0, 1.5));
-        let dimmer = super::table(&scene, &geometry(&scene));
-        assert!((f32::from_bits(table[1]) / f32::from_bits(dimmer[1]) - 2.0).abs() < 1e-6);
+        let dimmer = table(&scene);
+        assert!((f32::from_bits(bright[1]) / f32::from_bits(dimmer[1]) - 2.0).abs() < 1e-6);
     }
 }

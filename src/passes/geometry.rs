@@ -1,6 +1,7 @@
 //! Meshes and their places as the device sees them. In flow a scene and a view, out flow arrays for `shaders/shared.glsl`.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec3, Vec3};
 
@@ -17,43 +18,96 @@ pub(super) struct Draw {
     pub(super) sides: Sides,
 }
 
-/// Every mesh once, and the instances that a model sees.
+/// Where each mesh lies in [`Arrays`]; stays while views, materials and places change.
+pub(super) struct Layout {
+    /// The triangles of each mesh.
+    pub(super) ranges: Vec<Range<u32>>,
+    places: Vec<Place>,
+    meshes: Vec<Arc<Mesh>>,
+    trace: Option<Trace>,
+}
+
+/// Every mesh once, one after the other, each scaled to the unit ball.
 #[derive(Default)]
-pub(super) struct Geometry {
+pub(super) struct Arrays {
     pub(super) positions: Vec<f32>,
     pub(super) normals: Vec<f32>,
     pub(super) triangles: Vec<u32>,
-    pub(super) instances: Vec<InstanceRecord>,
-    pub(super) draws: Vec<Draw>,
-    /// Texture coordinates, as the mesh has them.
+    /// For tracing: texture coordinates, as the mesh has them.
     pub(super) uvs: Vec<f32>,
     /// For tracing: the corners of each triangle, in the order of the triangles, four numbers each.
     pub(super) corners: Vec<f32>,
-    /// For tracing in software: the hierarchy over the instances, then one a mesh.
+    /// For tracing in software: a hierarchy a mesh.
     pub(super) nodes: Vec<Node>,
-    /// For tracing in hardware: the meshes in their places.
-    pub(super) placed: Vec<PlacedMesh>,
-    /// The triangles of each mesh.
-    pub(super) meshes: Vec<Range<u32>>,
-    /// The most groups of nodes that wait while the tracer goes down through both levels.
-    pub(super) depth: u32,
-    /// For each instance its object in the scene.
-    pub(super) objects: Vec<usize>,
 }
 
-/// Where a mesh lies in the buffers, scaled to the unit ball; `to_mesh` undoes that.
+/// Where a mesh lies; `to_mesh` undoes its scaling.
 struct Place {
     first_vertex: u32,
     first_triangle: u32,
     first_node: u32,
     depth: u32,
     to_mesh: DAffine3,
+    /// The mesh's triangles in their order here, where that is another.
+    order: Vec<u32>,
+}
+
+impl Layout {
+    /// The meshes of `scene`, for tracing or not.
+    pub(super) fn new(scene: &Scene, trace: Option<Trace>) -> (Self, Arrays) {
+        let mut layout = Self { ranges: Vec::new(), places: Vec::new(), meshes: scene.meshes.clone(), trace };
+        let mut arrays = Arrays::default();
+        for mesh in &scene.meshes {
+            let place = arrays.add(mesh, trace);
+            layout.ranges.push(place.first_triangle..(arrays.triangles.len() / 3) as u32);
+            layout.places.push(place);
+        }
+        (layout, arrays)
+    }
+
+    /// Whether these are the meshes of `scene`, ready for `trace`.
+    pub(super) fn is_of(&self, scene: &Scene, trace: Option<Trace>) -> bool {
+        let same = |(a, b): (&Arc<Mesh>, &Arc<Mesh>)| Arc::ptr_eq(a, b);
+        self.trace == trace
+            && self.meshes.len() == scene.meshes.len()
+            && self.meshes.iter().zip(&scene.meshes).all(same)
+    }
+
+    /// Of each mesh the first vertex, and the triangles.
+    pub(super) fn spans(&self) -> impl Iterator<Item = (u32, &Range<u32>)> {
+        self.places.iter().map(|place| place.first_vertex).zip(&self.ranges)
+    }
+
+    /// The corners of a triangle of a mesh, counted here, in the mesh's own space.
+    pub(super) fn corners_of(&self, mesh: usize, triangle: u32) -> [DVec3; 3] {
+        let triangle = *self.places[mesh].order.get(triangle as usize).unwrap_or(&triangle);
+        let mesh = &self.meshes[mesh];
+        mesh.triangles[triangle as usize].map(|vertex| Vec3::from(mesh.positions[vertex as usize]).as_dvec3())
+    }
+}
+
+/// The instances that a model sees.
+#[derive(Default)]
+pub(super) struct Geometry {
+    pub(super) instances: Vec<InstanceRecord>,
+    pub(super) draws: Vec<Draw>,
+    /// For tracing in software: the hierarchy over the instances. Those of the meshes come behind [`Geometry::room`] nodes.
+    pub(super) nodes: Vec<Node>,
+    /// For tracing in hardware: the meshes in their places.
+    pub(super) placed: Vec<PlacedMesh>,
+    /// The most groups of nodes that wait while the tracer goes down through both levels.
+    pub(super) depth: u32,
+    /// For each instance its object in the scene.
+    pub(super) objects: Vec<usize>,
+    /// From each instance's mesh to the device's space, as the scene places it.
+    pub(super) transforms: Vec<DAffine3>,
 }
 
 impl Geometry {
-    /// `opaque`: whether objects are seen that are no dielectrics.
-    pub(super) fn new(scene: &Scene, view: &View, trace: Option<Trace>, opaque: bool) -> Self {
+    /// `room`: nodes before those of the meshes. `opaque`: whether objects are seen that are no dielectrics.
+    pub(super) fn new(scene: &Scene, view: &View, layout: &Layout, room: u32, opaque: bool) -> Self {
         let mut all = Self::default();
+        let trace = layout.trace;
         let is_seen = |object: &Object| opaque || is_dielectric(scene, object);
         let mut objects: Vec<usize> =
             (0..scene.objects.len()).filter(|&number| is_seen(&scene.objects[number])).collect();
@@ -67,14 +121,14 @@ impl Geometry {
             all.nodes = top.nodes;
             top_depth = top.depth;
         }
-        let places: Vec<_> = scene.meshes.iter().map(|mesh| all.add(mesh, trace)).collect();
-        all.depth = 2 * top_depth + places.iter().map(|place| place.depth).max().unwrap_or(0);
+        all.depth = 2 * top_depth + layout.places.iter().map(|place| place.depth).max().unwrap_or(0);
         let ranks = if trace.is_some() { scene.ranks() } else { vec![0; scene.objects.len()] };
         for &number in &objects {
             let object = &scene.objects[number];
             let mesh = &scene.meshes[object.mesh];
-            let place = &places[object.mesh];
-            let object_to_world = to_device * object.transform * place.to_mesh;
+            let place = &layout.places[object.mesh];
+            let transform = to_device * object.transform;
+            let object_to_world = transform * place.to_mesh;
             let world_to_object = object_to_world.inverse();
             all.instances.push(InstanceRecord {
                 object_to_world: object_to_world.into(),
@@ -82,7 +136,7 @@ impl Geometry {
                 world_to_object: world_to_object.into(),
                 first_triangle: place.first_triangle,
                 first_vertex: place.first_vertex,
-                first_node: place.first_node,
+                first_node: room + place.first_node,
                 material: object.material as u32,
                 smooth_normals: u32::from(object.smooth && !mesh.normals.is_empty()),
                 number: object.number as u32 + 1,
@@ -101,20 +155,19 @@ impl Geometry {
                     shown: if scene.is_seen_from_outside(object) { Shown::Fronts } else { Shown::Both },
                 },
             });
+            all.transforms.push(transform);
         }
         all.objects = objects;
         all
     }
 
-    /// The corners of a triangle, counted through all meshes, in its mesh's space; of geometry for tracing.
-    pub(super) fn corners_of(&self, triangle: u32) -> [DVec3; 3] {
-        let first = 3 * triangle as usize;
-        [0, 1, 2].map(|corner| {
-            let [x, y, z] = [0, 1, 2].map(|axis| f64::from(self.corners[4 * (first + corner) + axis]));
-            DVec3::new(x, y, z)
-        })
+    /// Nodes that a hierarchy over so many instances has at most: each but the last level's has two children.
+    pub(super) fn room(instances: usize) -> u32 {
+        instances.max(1) as u32
     }
+}
 
+impl Arrays {
     fn add(&mut self, mesh: &Mesh, trace: Option<Trace>) -> Place {
         let bounds = mesh.bounds();
         let center = bounds.center();
@@ -126,6 +179,7 @@ impl Geometry {
             first_node: self.nodes.len() as u32,
             depth: 0,
             to_mesh: DAffine3::from_translation(center) * DAffine3::from_scale(DVec3::splat(scale)),
+            order: Vec::new(),
         };
         let unit = |&position: &[f32; 3]| ((Vec3::from(position).as_dvec3() - center) / scale).as_vec3().to_array();
         let units: Vec<[f32; 3]> = mesh.positions.iter().map(unit).collect();
@@ -148,12 +202,12 @@ impl Geometry {
             triangles = bvh.order.iter().map(|&number| mesh.triangles[number as usize]).collect();
             self.nodes.extend(bvh.nodes);
             place.depth = bvh.depth;
+            place.order = bvh.order;
         }
         if trace.is_some() {
             self.corners.extend(triangles.iter().flat_map(corners).flat_map(|[x, y, z]| [x, y, z, 0.0]));
         }
         self.triangles.extend(triangles.iter().flatten());
-        self.meshes.push(place.first_triangle..(self.triangles.len() / 3) as u32);
         place
     }
 }

@@ -1,6 +1,8 @@
 //! What objects are made of, as the device has it. In flow materials and textures of a scene, out flow arrays for
 //! `shaders/shared.glsl`, `shaders/compensation.glsl` and `shaders/texture.glsl`.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use half::f16;
 
@@ -146,7 +148,7 @@ fn opaque_record(scene: &Scene, plan: &Plan, opaque: &Opaque) -> MaterialRecord 
 
 /// All textures in one buffer: where each starts, its width and its height, then the texels of each, linear as half floats, and
 /// of its halves.
-pub(super) fn texels(textures: &[Texture]) -> Vec<u32> {
+pub(super) fn texels(textures: &[Arc<Texture>]) -> Vec<u32> {
     let mut words = vec![0; 3 * textures.len()];
     for (number, texture) in textures.iter().enumerate() {
         let (mut width, mut height) = (texture.width, texture.height);

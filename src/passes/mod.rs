@@ -142,7 +142,7 @@ impl Renderer {
         check(gpu, plan)?;
         let mut commands = Commands::new(gpu)?;
         let trace = trace_of(gpu, plan)?;
-        let resources = Resources::new(&mut commands, scene, plan, trace)?;
+        let resources = Resources::new(&mut commands, scene, plan, trace, None)?;
         let upload = start.elapsed();
         let passes = Passes::new(&mut commands, &resources, plan, trace)?;
         Ok(Self { commands, resources, passes, model: plan.model, trace, upload, set_up: start.elapsed() })
@@ -158,7 +158,7 @@ impl Renderer {
         let gpu = self.commands.gpu().clone();
         check(&gpu, plan)?;
         let trace = trace_of(&gpu, plan)?;
-        let resources = Resources::new(&mut self.commands, scene, plan, trace)?;
+        let resources = Resources::new(&mut self.commands, scene, plan, trace, Some(&self.resources))?;
         let same = (plan.model, trace) == (self.model, self.trace)
             && resources.specialization == self.resources.specialization
             && resources.opaque == self.resources.opaque;

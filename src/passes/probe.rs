@@ -118,7 +118,7 @@ impl TraceProbe {
         let plan = Plan::new(scene, &args)?;
         super::check(gpu, &plan)?;
         let mut commands = Commands::new(gpu)?;
-        let resources = Resources::new(&mut commands, scene, &plan, Some(trace))?;
+        let resources = Resources::new(&mut commands, scene, &plan, Some(trace), None)?;
         Ok(Self { commands, trace, resources, camera: scene.camera.position })
     }
 

@@ -10,18 +10,18 @@ use xxhash_rust::xxh3::Xxh3;
 
 use super::double::{Facet, Placed};
 use super::emitters;
-use super::geometry::{Draw, Geometry};
+use super::geometry::{Draw, Geometry, Layout};
 use super::materials::{is_rough, materials, texels};
 use super::skylight;
 use super::view::View;
 use crate::effects::Effect;
 use crate::gpu::{
     AccelerationStructure, Bind, BindGroup, Buffer, Commands, Format, Frame, Gpu, GpuError, Image, ImageDesc,
-    LightRecord, MaterialRecord, Result, Specialization, Use,
+    LightRecord, MaterialRecord, MeshStructures, Result, Specialization, Use,
 };
 use crate::options::{Model, Trace};
 use crate::plan::{Budget, Estimator, Plan};
-use crate::scene::{Panorama, Scene, Surroundings};
+use crate::scene::{Panorama, Scene, Surroundings, Texture};
 
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
@@ -57,6 +57,143 @@ pub(super) struct Resources {
     frame: (Frame, Arc<Buffer>),
     /// A number that tells all of this from other scenes, if the plan has a use for it.
     pub(super) fingerprint: Option<u128>,
+    meshes: Arc<Meshes>,
+    sky: Arc<Sky>,
+    textures: Arc<Textures>,
+}
+
+/// Meshes on the device: what stays while views, materials and places change.
+struct Meshes {
+    layout: Layout,
+    positions: Bind,
+    normals: Bind,
+    triangles: Bind,
+    traced: Option<TracedMeshes>,
+    /// For `double`.
+    facets: Option<Bind>,
+}
+
+/// What only traced models read of meshes.
+struct TracedMeshes {
+    corners: Bind,
+    uvs: Bind,
+    hierarchies: Hierarchies,
+}
+
+/// A hierarchy a mesh.
+enum Hierarchies {
+    /// Behind room for so many nodes of the one over the instances.
+    Nodes(Arc<Buffer>, u32),
+    Structures(Arc<MeshStructures>),
+}
+
+impl Meshes {
+    /// Whether these are the meshes of `scene`, as `plan` and `trace` need them, with room for so many nodes.
+    fn is_of(&self, scene: &Scene, plan: &Plan, trace: Option<Trace>, room: u32) -> bool {
+        let fits = match &self.traced {
+            Some(TracedMeshes { hierarchies: Hierarchies::Nodes(_, here), .. }) => *here == room,
+            _ => true,
+        };
+        fits && self.layout.is_of(scene, trace) && self.facets.is_some() == (plan.model == Model::Double)
+    }
+
+    fn new(
+        upload: &mut Upload<'_>,
+        scene: &Scene,
+        plan: &Plan,
+        trace: Option<Trace>,
+        room: u32,
+    ) -> Result<(Self, Duration)> {
+        let start = Instant::now();
+        let (layout, arrays) = Layout::new(scene, trace);
+        let mut acceleration = start.elapsed();
+        let mut traced = None;
+        if let Some(trace) = trace {
+            let corners = Arc::new(upload.commands.upload_buffer("corners of the triangles", &arrays.corners)?);
+            let start = Instant::now();
+            let hierarchies = match trace {
+                Trace::Hardware => {
+                    let built = MeshStructures::new(upload.commands, &corners, &layout.ranges)?;
+                    acceleration += start.elapsed();
+                    Hierarchies::Structures(Arc::new(built))
+                }
+                Trace::Software => {
+                    let mut nodes = vec![[0; 20]; room as usize];
+                    nodes.extend(arrays.nodes.iter());
+                    upload.hash(&nodes);
+                    let nodes = upload.commands.upload_buffer("nodes of the hierarchies", &nodes)?;
+                    Hierarchies::Nodes(Arc::new(nodes), room)
+                }
+            };
+            let uvs = upload.buffer("texture coordinates", &arrays.uvs)?;
+            traced = Some(TracedMeshes { corners: Bind::Buffer(corners), uvs, hierarchies });
+        }
+        let facets = match plan.model {
+            Model::Double => Some(upload.buffer("facets", &Facet::all(&layout, &arrays))?),
+            _ => None,
+        };
+        let meshes = Self {
+            positions: upload.buffer("positions", &arrays.positions)?,
+            normals: upload.buffer("normals", &arrays.normals)?,
+            triangles: upload.buffer("triangles", &arrays.triangles)?,
+            layout,
+            traced,
+            facets,
+        };
+        Ok((meshes, acceleration))
+    }
+}
+
+/// The environment on the device.
+struct Sky {
+    /// The texels that it was made of, if those are an image's.
+    texels: Option<Arc<Vec<[f32; 3]>>>,
+    size: [u32; 2],
+    levels: u32,
+    image: Bind,
+    /// Its table for paths that look for light, if there are such, and how many texels that has.
+    cells: Option<Bind>,
+}
+
+impl Sky {
+    fn is_of(&self, panorama: Option<&Panorama>, levels: u32, cells: bool) -> bool {
+        let same = match (&self.texels, panorama) {
+            (Some(texels), Some(panorama)) => {
+                Arc::ptr_eq(texels, &panorama.texels) && self.size == [panorama.width, panorama.height]
+            }
+            (None, None) => true,
+            _ => false,
+        };
+        same && self.levels == levels && self.cells.is_some() == cells
+    }
+
+    fn new(upload: &mut Upload<'_>, panorama: Option<&Panorama>, levels: u32, cells: bool) -> Result<Self> {
+        let single = Panorama::new(1, 1, vec![[1.0; 3]]);
+        let of = panorama.unwrap_or(&single);
+        let image = upload_panorama(upload.commands, of, levels)?;
+        upload.hash(&of.texels);
+        upload.commands.run(|cmd| cmd.use_image(&image, Use::Sampled))?;
+        let table = |panorama| upload.buffer("cells of the environment", &skylight::table(panorama));
+        Ok(Self {
+            texels: panorama.map(|panorama| panorama.texels.clone()),
+            size: [of.width, of.height],
+            levels,
+            image: Bind::Sampled(Arc::new(image)),
+            cells: panorama.filter(|_| cells).map(table).transpose()?,
+        })
+    }
+}
+
+/// Textures on the device.
+struct Textures {
+    of: Vec<Arc<Texture>>,
+    texels: Bind,
+}
+
+impl Textures {
+    fn is_of(&self, textures: &[Arc<Texture>]) -> bool {
+        self.of.len() == textures.len() && self.of.iter().zip(textures).all(|(a, b)| Arc::ptr_eq(a, b))
+    }
 }
 
 /// Puts arrays on the device, and takes their fingerprint on the way.
@@ -83,12 +220,32 @@ impl Upload<'_> {
 const TRACE_STACK: u32 = 48;
 
 impl Resources {
-    pub(super) fn new(commands: &mut Commands, scene: &Scene, plan: &Plan, trace: Option<Trace>) -> Result<Self> {
+    /// What `before` has of it stays where it is.
+    pub(super) fn new(
+        commands: &mut Commands,
+        scene: &Scene,
+        plan: &Plan,
+        trace: Option<Trace>,
+        before: Option<&Self>,
+    ) -> Result<Self> {
         let view = View::new(&scene.camera, scene.bounds(), plan.size);
-        let start = Instant::now();
         let opaque = trace.is_some() && plan.effects.contains(Effect::Opaque);
-        let geometry = Geometry::new(scene, &view, trace, opaque);
-        let mut acceleration = start.elapsed();
+        // All of a fingerprint has to be seen.
+        let before = before.filter(|_| plan.checkpoint.is_none());
+        let mut upload = Upload { commands, hash: plan.checkpoint.is_some().then(Xxh3::new) };
+
+        let room = Geometry::room(scene.objects.len());
+        let kept = before.map(|before| &before.meshes).filter(|meshes| meshes.is_of(scene, plan, trace, room));
+        let (meshes, mut acceleration) = match kept {
+            Some(meshes) => (meshes.clone(), Duration::ZERO),
+            None => {
+                let (meshes, acceleration) = Meshes::new(&mut upload, scene, plan, trace, room)?;
+                (Arc::new(meshes), acceleration)
+            }
+        };
+        let start = Instant::now();
+        let geometry = Geometry::new(scene, &view, &meshes.layout, room, opaque);
+        acceleration += start.elapsed();
         if geometry.depth > TRACE_STACK {
             return Err(GpuError::TooLarge {
                 what: "the depth of the hierarchy over the triangles".into(),
@@ -103,15 +260,24 @@ impl Resources {
             materials.push(MaterialRecord::default());
         }
         let lights = lights(scene, &view);
-        let single = Panorama::new(1, 1, vec![[1.0; 3]]);
-        let (panorama, is_image) = match &scene.environment.light {
-            Surroundings::Image(panorama) => (panorama, true),
-            Surroundings::Color(_) => (&single, false),
+        let panorama = match &scene.environment.light {
+            Surroundings::Image(panorama) => Some(panorama),
+            Surroundings::Color(_) => None,
         };
-        let levels = levels(commands.gpu(), panorama, scene, plan);
-        let mut upload = Upload { commands, hash: plan.checkpoint.is_some().then(Xxh3::new) };
-        let environment = upload_panorama(upload.commands, panorama, levels)?;
-        upload.hash(&panorama.texels);
+        let levels = levels(upload.commands.gpu(), panorama, scene, plan);
+        let rough = plan.model == Model::Path && plan.effects.contains(Effect::Roughness);
+        let cells = trace.is_some() && panorama.is_some() && (opaque || rough);
+        let kept = before.map(|before| &before.sky).filter(|sky| sky.is_of(panorama, levels, cells));
+        let sky = match kept {
+            Some(sky) => sky.clone(),
+            None => Arc::new(Sky::new(&mut upload, panorama, levels, cells)?),
+        };
+        let worn: &[_] = if plan.effects.contains(Effect::Textures) { &scene.textures } else { &[] };
+        let kept = before.map(|before| &before.textures).filter(|textures| textures.is_of(worn));
+        let textures = match kept {
+            Some(textures) => textures.clone(),
+            None => Arc::new(Textures { of: worn.to_vec(), texels: upload.buffer("texels", &texels(worn))? }),
+        };
         let ranked = ranked_materials(scene, &geometry);
         if ranked.len() > 1 << 16 {
             return Err(GpuError::TooLarge {
@@ -125,64 +291,66 @@ impl Resources {
         let around = if nests { ranks_around_camera(scene, &geometry) } else { [0; 8] };
         let medium = (around[0] > 0).then(|| ranked[around[0] as usize]);
         let frame = Frame {
-            environment_size: [panorama.width, panorama.height],
+            environment_size: sky.size,
             environment_levels: levels,
             camera_bodies: std::array::from_fn(|i| around[2 * i] << 16 | around[2 * i + 1]),
             camera_index: medium.map_or(1.0, |medium| materials[medium as usize].refraction_index),
             camera_medium: medium.map_or(0, |medium| medium + 1),
             ..frame(scene, plan, &view, lights.len() as u32)
         };
-        let texels = if plan.effects.contains(Effect::Textures) { texels(&scene.textures) } else { Vec::new() };
         upload.hash(&[paths_frame(frame)]);
-        upload.commands.run(|cmd| cmd.use_image(&environment, Use::Sampled))?;
         let frame_buffer = Arc::new(upload.commands.upload_buffer("frame", &[frame])?);
-        let mut bindings = vec![
+        let bindings = vec![
             Bind::Buffer(frame_buffer.clone()),
             upload.buffer("instances", &geometry.instances)?,
             upload.buffer("materials", &materials)?,
             upload.buffer("lights", &lights)?,
-            upload.buffer("positions", &geometry.positions)?,
-            upload.buffer("normals", &geometry.normals)?,
-            upload.buffer("triangles", &geometry.triangles)?,
+            meshes.positions.clone(),
+            meshes.normals.clone(),
+            meshes.triangles.clone(),
+            sky.image.clone(),
+            upload.buffer("albedos", &albedos)?,
         ];
-        bindings.push(Bind::Sampled(Arc::new(environment)));
-        bindings.push(upload.buffer("albedos", &albedos)?);
         let mut traced = Vec::new();
-        if trace.is_some() {
+        if let Some(of_meshes) = &meshes.traced {
             traced.clone_from(&bindings);
-            let corners = upload.commands.upload_buffer("corners of the triangles", &geometry.corners)?;
             let start = Instant::now();
-            traced.push(match trace {
-                Some(Trace::Hardware) => {
-                    let (meshes, placed) = (&geometry.meshes, &geometry.placed);
-                    let built = AccelerationStructure::new(upload.commands, &corners, meshes, placed)?;
+            traced.push(match &of_meshes.hierarchies {
+                Hierarchies::Structures(meshes) => {
+                    let built = AccelerationStructure::new(upload.commands, meshes, &geometry.placed)?;
                     acceleration += start.elapsed();
                     Bind::Acceleration(Arc::new(built))
                 }
-                _ => upload.buffer("nodes of the hierarchies", &geometry.nodes)?,
+                Hierarchies::Nodes(nodes, _) => {
+                    upload.hash(&geometry.nodes);
+                    upload.commands.update_buffer(nodes, &geometry.nodes)?;
+                    Bind::Buffer(nodes.clone())
+                }
             });
-            traced.push(Bind::Buffer(Arc::new(corners)));
+            traced.push(of_meshes.corners.clone());
             traced.push(upload.buffer("materials of the bodies", &ranked)?);
-            traced.push(upload.buffer("texture coordinates", &geometry.uvs)?);
-            traced.push(upload.buffer("texels", &texels)?);
-            let rough = plan.model == Model::Path && plan.effects.contains(Effect::Roughness);
-            let cells = if is_image && (opaque || rough) { skylight::table(panorama) } else { skylight::none() };
-            traced.push(upload.buffer("cells of the environment", &cells)?);
+            traced.push(of_meshes.uvs.clone());
+            traced.push(textures.texels.clone());
+            traced.push(match &sky.cells {
+                Some(cells) => cells.clone(),
+                None => upload.buffer("cells of the environment", &skylight::none())?,
+            });
         }
         let emitters = if trace.is_some() && opaque && plan.model == Model::Path {
-            emitters::table(scene, &geometry)
+            emitters::table(scene, &meshes.layout, &geometry)
         } else {
             emitters::none()
         };
         let emitters = upload.buffer("emitters", &emitters)?;
         let mut layered = Vec::new();
         let mut placed = Vec::new();
-        if plan.model == Model::Double {
+        if let Some(facets) = &meshes.facets {
             placed = Placed::all(scene, &geometry, &view, plan.size);
             layered.clone_from(&bindings);
-            layered.push(upload.buffer("facets", &Facet::all(scene, &geometry))?);
+            layered.push(facets.clone());
             layered.push(upload.buffer("instances in the picture", &placed)?);
         }
+        let is_image = panorama.is_some();
         let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
         let fingerprint = upload.hash.as_ref().map(Xxh3::digest128);
         Ok(Self {
@@ -203,6 +371,9 @@ impl Resources {
             acceleration: trace.map(|_| acceleration),
             frame: (frame, frame_buffer),
             fingerprint,
+            meshes,
+            sky,
+            textures,
         })
     }
 
@@ -303,7 +474,7 @@ fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) ->
     if levels <= 1 {
         return commands.upload_image(&desc, &pack(&panorama.texels, half));
     }
-    let mut texels = panorama.texels.clone();
+    let mut texels = panorama.texels.to_vec();
     texels.resize((width * height) as usize, [0.0; 3]);
     let mut level = panorama.halved();
     for i in 1..levels {
@@ -321,7 +492,8 @@ fn upload_panorama(commands: &mut Commands, panorama: &Panorama, levels: u32) ->
 
 /// Levels of the panorama that rough surfaces and wide look-ups see averages of; 1 where there are none, or where the levels would
 /// not fit.
-fn levels(gpu: &Gpu, panorama: &Panorama, scene: &Scene, plan: &Plan) -> u32 {
+fn levels(gpu: &Gpu, panorama: Option<&Panorama>, scene: &Scene, plan: &Plan) -> u32 {
+    let Some(panorama) = panorama else { return 1 };
     let fits = panorama.height + panorama.height / 2 <= gpu.max_image_side();
     let opaque = plan.effects.contains(Effect::Opaque);
     let rough = plan.effects.contains(Effect::Roughness) && scene.materials.iter().any(is_rough);

@@ -396,6 +396,7 @@ impl fmt::Display for Explanation {
 
 #[cfg(test)]
 mod tests {
+    use std::sync::Arc;
     use std::time::Duration;
 
     use glam::DVec3;
@@ -504,7 +505,7 @@ mod tests {
     fn faulty_meshes_come_first_and_many_are_cut() {
         let mut scene = built_in();
         scene.meshes = vec![scene.meshes[0].clone(); 10];
-        scene.meshes[9].faults.open_edges = 2;
+        Arc::make_mut(&mut scene.meshes[9]).faults.open_edges = 2;
         let text = explained(&scene, "auto").to_string();
         assert!(text.contains("\nMeshes\n  teapot_body.obj: 25582 triangles; 2 open edges\n"), "{text}");
         assert!(text.contains("no faults\n  and 2 more\n"), "{text}");
@@ -528,7 +529,7 @@ mod tests {
     #[test]
     fn the_json_has_the_members_that_the_docs_name() {
         let mut scene = lit(1);
-        scene.meshes[0].overlaps = true;
+        Arc::make_mut(&mut scene.meshes[0]).overlaps = true;
         scene.camera.position = scene.bounds_of(&scene.objects[0]).center();
         // A body once more at its own place.
         scene.objects.push(scene.objects[2].clone());

@@ -3,6 +3,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use glam::DAffine3;
@@ -16,7 +17,7 @@ use crate::Result;
 /// Meshes, objects, materials and textures so far.
 #[derive(Debug, Default)]
 pub struct Assembly {
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<Arc<Mesh>>,
     pub objects: Vec<Object>,
     pub materials: Vec<Material>,
     pub textures: Textures,
@@ -92,7 +93,7 @@ impl Assembly {
         let mut indices = Vec::with_capacity(parts.len());
         for part in parts {
             indices.push((self.meshes.len(), part.material));
-            self.meshes.push(part.mesh);
+            self.meshes.push(Arc::new(part.mesh));
         }
         let file = MeshFile { parts: indices, materials, images, warnings: material_warnings, first_material: None };
         self.read.insert(identity, file);

@@ -2,6 +2,7 @@
 //! not negative.
 
 use std::path::Path;
+use std::sync::Arc;
 
 use glam::DVec3;
 
@@ -39,7 +40,7 @@ pub struct Panorama {
     /// Rows.
     pub height: u32,
     /// Radiance in linear Rec. 709, row by row from +y; finite and not negative.
-    pub texels: Vec<[f32; 3]>,
+    pub texels: Arc<Vec<[f32; 3]>>,
     /// What was not.
     pub repaired: Repairs,
 }
@@ -96,7 +97,7 @@ impl Panorama {
                 });
             }
         }
-        Self { width, height, texels, repaired }
+        Self { width, height, texels: Arc::new(texels), repaired }
     }
 
     /// The next level of a mip chain: half as wide and high, rounded down, and at least 1; texels are means over the solid angle
@@ -106,7 +107,7 @@ impl Panorama {
         // A row between v and v + dv covers cos(pi v) - cos(pi (v + dv)).
         let (width, height, texels) =
             image::halved(&self.texels, self.width, self.height, |edge| -(edge * std::f64::consts::PI).cos());
-        Self { width, height, texels, repaired: Repairs::default() }
+        Self { width, height, texels: Arc::new(texels), repaired: Repairs::default() }
     }
 }
 
@@ -149,6 +150,6 @@ mod tests {
         let panorama = Panorama::new(5, 1, texels);
         assert_eq!(panorama.repaired, Repairs { texels: 4, nan: 2, infinite: 1, negative: 2 });
         let expected = [[1.0, 2.0, 3.0], [0.0, 1.0, 1.0], [65504.0, 0.0, 0.0], [0.0, 70000.0, 0.0], [0.0; 3]];
-        assert_eq!(panorama.texels, expected);
+        assert_eq!(*panorama.texels, expected);
     }
 }

@@ -24,6 +24,7 @@ mod touching;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use glam::{DAffine3, DVec3};
 
@@ -58,9 +59,9 @@ pub struct Scene {
     /// Materials, each with its name.
     pub materials: Vec<Material>,
     /// The images that materials name; several may share one.
-    pub textures: Vec<Texture>,
+    pub textures: Vec<Arc<Texture>>,
     /// Meshes; several objects may share one.
-    pub meshes: Vec<Mesh>,
+    pub meshes: Vec<Arc<Mesh>>,
     /// The meshes in their places.
     pub objects: Vec<Object>,
     /// The scene's own render options.
@@ -178,7 +179,7 @@ impl Scene {
 }
 
 /// What is wrong with meshes, as far as it shows on what they are: only a medium wants a closed surface.
-fn faults_of_meshes(objects: &[Object], meshes: &[Mesh], materials: &[Material]) -> Vec<String> {
+fn faults_of_meshes(objects: &[Object], meshes: &[Arc<Mesh>], materials: &[Material]) -> Vec<String> {
     let mut bounds_medium = vec![false; meshes.len()];
     for object in objects {
         let surface = &materials[object.material].surface;
@@ -204,9 +205,9 @@ fn faults_of_meshes(objects: &[Object], meshes: &[Mesh], materials: &[Material])
 /// Says which meshes wear a texture but have no coordinates for it.
 fn warn_of_missing_uvs(
     objects: &[Object],
-    meshes: &[Mesh],
+    meshes: &[Arc<Mesh>],
     materials: &[Material],
-    textures: &[Texture],
+    textures: &[Arc<Texture>],
     warnings: &mut Vec<String>,
 ) {
     let before = warnings.len();

@@ -2,6 +2,7 @@
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use half::f16;
 
@@ -68,7 +69,7 @@ fn name(path: &Path) -> String {
 #[derive(Debug, Default)]
 pub struct Textures {
     /// In the order in which they were named first.
-    pub all: Vec<Texture>,
+    pub all: Vec<Arc<Texture>>,
     numbers: HashMap<PathBuf, usize>,
 }
 
@@ -79,7 +80,7 @@ impl Textures {
         if let Some(&number) = self.numbers.get(&identity) {
             return Ok(number);
         }
-        self.all.push(Texture::read(files, path, warnings)?);
+        self.all.push(Arc::new(Texture::read(files, path, warnings)?));
         self.numbers.insert(identity, self.all.len() - 1);
         Ok(self.all.len() - 1)
     }

@@ -156,7 +156,7 @@ mod tests {
             Mesh::new(raw).expect("a tetrahedron")
         };
         let mut table = scene.clone();
-        table.meshes = vec![flat(10.0), flat(0.1)];
+        table.meshes = vec![flat(10.0).into(), flat(0.1).into()];
         table.objects = [0, 1].map(|mesh| Object { mesh, ..scene.objects[0].clone() }).to_vec();
         assert_eq!(table.touching(), [Touch { objects: [1, 0], triangles: 1 }]);
         table.objects.reverse();

@@ -529,8 +529,7 @@ fn every_scene_in_assets_is_sound() {
     let mut count = 0;
     for entry in fs::read_dir(scenes).unwrap() {
         let scene = Scene::load(Some(&entry.unwrap().path()), &Overrides::default()).unwrap();
-        let faulty = |mesh: &&vitrum::scene::Mesh| !mesh.faults.is_empty();
-        assert!(scene.meshes.iter().find(faulty).is_none(), "{}", scene.name);
+        assert!(scene.meshes.iter().all(|mesh| mesh.faults.is_empty()), "{}", scene.name);
         count += 1;
     }
     assert!(count >= 5);

@@ -12,7 +12,7 @@ use crate::shapes::{Part, cuboid, glass, hollow_ball, icosphere, prism, rectangl
 /// The first mesh of a file of `assets/meshes`.
 pub fn asset(name: &str) -> Mesh {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/meshes").join(name);
-    Scene::load(Some(&path), &Overrides::default()).unwrap().meshes.remove(0)
+    Scene::load(Some(&path), &Overrides::default()).unwrap().meshes[0].as_ref().clone()
 }
 
 /// Teapot and cups.

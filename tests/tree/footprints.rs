@@ -41,7 +41,7 @@ fn board() -> Scene {
     let mut board = rectangle(4.0, 4.0);
     board.uvs = board.positions.iter().map(|&[x, y, _]| [x / 4.0, y / 4.0]).collect();
     let tilt = DAffine3::from_rotation_x(-1.1);
-    Scene { textures: vec![texture], ..in_white(scene([Part::of(board, Surface::Opaque(worn)).placed(tilt)])) }
+    Scene { textures: vec![texture.into()], ..in_white(scene([Part::of(board, Surface::Opaque(worn)).placed(tilt)])) }
 }
 
 /// The same through a ball of glass.
@@ -122,8 +122,8 @@ fn extreme_images_stay_finite() {
         let texels: Vec<_> = squares(width, height, 1).map(|value| [f16::from_f32(0.5 * value); 4]).collect();
         let mean = texels.iter().map(|texel| f64::from(texel[0])).sum::<f64>() / f64::from(width * height);
         let texture = Texture { path: "small".into(), width, height, texels: Texels::Linear(texels) };
-        let mut scene = Scene { textures: vec![texture], ..board() };
-        let uvs = &mut scene.meshes[0].uvs;
+        let mut scene = Scene { textures: vec![texture.into()], ..board() };
+        let uvs = &mut std::sync::Arc::make_mut(&mut scene.meshes[0]).uvs;
         uvs.iter_mut().flatten().for_each(|coordinate| *coordinate *= repeats);
         scene.objects[0].transform = DAffine3::from_rotation_x(-1.5);
         let picture = device.picture(&scene, Shot { size: SMALL, footprints: true, ..Shot::default() });

@@ -89,7 +89,7 @@ fn the_smaller_of_two_bodies_shows_and_the_order_in_the_file_does_not_matter() {
 fn three_in_a_glass() -> Scene {
     let mut scene = water_in_a_glass();
     let ice = Part::of(icosphere(3), of_priority(0, 1.31));
-    scene.meshes.push(ice.mesh);
+    scene.meshes.push(ice.mesh.into());
     scene.materials.push(vitrum::scene::Material { name: "ice".into(), surface: ice.surface });
     let transform = DAffine3::from_translation(DVec3::Y * 0.35) * scaled(0.35);
     scene.objects.push(vitrum::scene::Object { mesh: 2, material: 2, number: 2, transform, smooth: true });

@@ -114,8 +114,10 @@ fn in_white_light_a_board_has_its_colour_a_mirror_mirrors_and_lamps_shine() {
     // Its left half, from the middle of one texel to the other and farther.
     textured.uvs = textured.positions.iter().map(|&[x, _, _]| [0.25 + 5.0 * x, 0.5]).collect();
     let worn = Opaque { base_color_texture: Some(0), specular: 0.0, ..Opaque::default() };
-    let image =
-        Scene { textures: vec![texture], ..in_the_dark([Part::of(textured, Surface::Opaque(worn))], Vec::new()) };
+    let image = Scene {
+        textures: vec![texture.into()],
+        ..in_the_dark([Part::of(textured, Surface::Opaque(worn))], Vec::new())
+    };
     let silver = Opaque { base_color: DVec3::new(0.9, 0.6, 0.3), metallic: 1.0, roughness: 0.0, ..Opaque::default() };
     let mirror = in_the_dark([Part::of(rectangle(3.0, 3.0), Surface::Opaque(silver.clone()))], Vec::new());
     let color = DVec3::new(0.8, 0.3, 0.5);
