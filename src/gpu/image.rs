@@ -150,7 +150,13 @@ impl Image {
             });
         }
         let extent = vk::Extent2D { width: desc.width, height: desc.height };
+        // What a screen shows is encoded already, and looked at as sRGB: `Screen::set_picture`.
+        let flags = match desc.format {
+            Format::Rgba8 => vk::ImageCreateFlags::MUTABLE_FORMAT,
+            _ => vk::ImageCreateFlags::empty(),
+        };
         let info = vk::ImageCreateInfo::default()
+            .flags(flags)
             .image_type(vk::ImageType::TYPE_2D)
             .format(desc.format.handle())
             .extent(extent.into())

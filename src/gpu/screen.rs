@@ -1,6 +1,6 @@
 //! A window's surface, on which egui draws. In flow a window and what egui made of a frame, out flow presented pictures.
 //!
-//! The egui side is `egui-ash-renderer`, on dynamic rendering; pictures reach it as egui textures. One frame is in flight.
+//! The egui side is `egui-ash-renderer`, on dynamic rendering. Pictures are drawn where they are, without a copy. One frame is in flight.
 
 use std::sync::{Arc, PoisonError};
 
@@ -11,7 +11,7 @@ use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::Window;
 
 use super::error::Context;
-use super::{DeviceInfo, Gpu, GpuError, Instance, Result};
+use super::{DeviceInfo, Gpu, GpuError, Image, Instance, Result};
 
 /// What became of a frame.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -38,6 +38,8 @@ pub struct Screen {
     acquired: vk::Semaphore,
     /// Textures that the frame before may still have shown.
     freed: Vec<egui::TextureId>,
+    /// What the last frame may have shown, by its number.
+    pictures: Vec<Option<Picture>>,
     gpu: Gpu,
     /// Held so that it outlives the surface.
     window: Arc<Window>,
@@ -134,6 +136,7 @@ impl Screen {
             fence: vk::Fence::null(),
             acquired: vk::Semaphore::null(),
             freed: Vec::new(),
+            pictures: Vec::new(),
             gpu: gpu.clone(),
             window: surface.window.clone(),
         };
@@ -157,6 +160,23 @@ impl Screen {
                 .map_err(failed)?,
         );
         Ok(screen)
+    }
+
+    /// Puts `image`, of [`Format::Rgba8`](super::Format::Rgba8), last used as [`Use::Sampled`](super::Use::Sampled) and encoded as
+    /// sRGB, in the place of the picture of that number; what egui knows it by.
+    pub fn set_picture(&mut self, number: usize, image: Arc<Image>) -> Result<egui::TextureId> {
+        let Some(egui) = &mut self.egui else { return Err(GpuError::Interface("nothing draws".into())) };
+        let mut picture = Picture::new(&self.gpu, image)?;
+        let id = egui.add_user_texture(picture.set);
+        picture.id = id;
+        if self.pictures.len() <= number {
+            self.pictures.resize_with(number + 1, || None);
+        }
+        // The last frame was waited for: what it showed may go.
+        if let Some(before) = self.pictures[number].replace(picture) {
+            egui.remove_user_texture(before.id);
+        }
+        Ok(id)
     }
 
     /// Takes over textures that changed, and those that are gone.
@@ -344,6 +364,7 @@ impl Drop for Screen {
     fn drop(&mut self) {
         self.forget();
         self.egui = None;
+        self.pictures.clear();
         // SAFETY: every frame was waited for; what was not made is null and ignored. The surface goes before its window.
         unsafe {
             let device = &self.gpu.device;
@@ -351,6 +372,87 @@ impl Drop for Screen {
             device.destroy_fence(self.fence, None);
             device.destroy_command_pool(self.pool, None);
             self.surfaces.destroy_surface(self.surface, None);
+        }
+    }
+}
+
+/// A picture as egui's pipeline sees it.
+struct Picture {
+    id: egui::TextureId,
+    set: vk::DescriptorSet,
+    layout: vk::DescriptorSetLayout,
+    pool: vk::DescriptorPool,
+    view: vk::ImageView,
+    sampler: vk::Sampler,
+    /// Held while it is shown.
+    image: Arc<Image>,
+    gpu: Gpu,
+}
+
+impl Picture {
+    fn new(gpu: &Gpu, image: Arc<Image>) -> Result<Self> {
+        const KIND: vk::DescriptorType = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
+        let mut picture = Self {
+            id: egui::TextureId::default(),
+            set: vk::DescriptorSet::null(),
+            layout: vk::DescriptorSetLayout::null(),
+            pool: vk::DescriptorPool::null(),
+            view: vk::ImageView::null(),
+            sampler: vk::Sampler::null(),
+            image,
+            gpu: gpu.clone(),
+        };
+        let image = &picture.image;
+        let view = vk::ImageViewCreateInfo::default()
+            .image(image.handle)
+            .view_type(vk::ImageViewType::TYPE_2D)
+            .format(vk::Format::R8G8B8A8_SRGB)
+            .subresource_range(image.range());
+        let sampler = vk::SamplerCreateInfo::default()
+            .mag_filter(vk::Filter::LINEAR)
+            .min_filter(vk::Filter::LINEAR)
+            .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
+            .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE);
+        let sizes = [vk::DescriptorPoolSize { ty: KIND, descriptor_count: 1 }];
+        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
+        // As egui's renderer makes them for its own textures.
+        let bindings = [vk::DescriptorSetLayoutBinding::default()
+            .descriptor_type(KIND)
+            .descriptor_count(1)
+            .stage_flags(vk::ShaderStageFlags::FRAGMENT)];
+        let layout = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+        let device = &gpu.device;
+        // SAFETY: the infos point to locals; the image was made with a format that can be changed, and is held; whatever fails,
+        // dropping `picture` destroys what was made and ignores nulls.
+        unsafe {
+            picture.view = device.create_image_view(&view, None).context("vkCreateImageView")?;
+            picture.sampler = device.create_sampler(&sampler, None).context("vkCreateSampler")?;
+            picture.pool = device.create_descriptor_pool(&pool, None).context("vkCreateDescriptorPool")?;
+            picture.layout =
+                device.create_descriptor_set_layout(&layout, None).context("vkCreateDescriptorSetLayout")?;
+            let layouts = [picture.layout];
+            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(picture.pool).set_layouts(&layouts);
+            picture.set = device.allocate_descriptor_sets(&info).context("vkAllocateDescriptorSets")?[0];
+            let image = [vk::DescriptorImageInfo::default()
+                .sampler(picture.sampler)
+                .image_view(picture.view)
+                .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
+            let write = vk::WriteDescriptorSet::default().dst_set(picture.set).descriptor_type(KIND).image_info(&image);
+            device.update_descriptor_sets(&[write], &[]);
+        }
+        Ok(picture)
+    }
+}
+
+impl Drop for Picture {
+    fn drop(&mut self) {
+        // SAFETY: every frame was waited for; the set goes with its pool.
+        unsafe {
+            let device = &self.gpu.device;
+            device.destroy_descriptor_pool(self.pool, None);
+            device.destroy_descriptor_set_layout(self.layout, None);
+            device.destroy_sampler(self.sampler, None);
+            device.destroy_image_view(self.view, None);
         }
     }
 }

@@ -42,13 +42,13 @@ impl Display {
         Ok(Self { pipeline })
     }
 
-    /// sRGB values of every pixel, and the time of the pass.
+    /// An image of sRGB values, ready to be sampled, and the time of the pass.
     pub(super) fn run(
         &self,
         commands: &mut Commands,
         targets: &Targets,
         plan: &Plan,
-    ) -> Result<(Vec<[u8; 4]>, Vec<PassTime>)> {
+    ) -> Result<(Image, Vec<PassTime>)> {
         let screen = Image::new(
             commands.gpu(),
             &ImageDesc {
@@ -56,7 +56,7 @@ impl Display {
                 width: targets.mean.width(),
                 height: targets.mean.height(),
                 format: DISPLAY,
-                uses: &[Use::ColorTarget, Use::CopySource],
+                uses: &[Use::ColorTarget, Use::CopySource, Use::Sampled],
             },
         )?;
         let push = Push { scale: plan.exposure.exp2() as f32, curve: plan.tonemap as u32 };
@@ -67,9 +67,9 @@ impl Display {
                     pass.bind(&self.pipeline, &targets.display);
                     pass.draw(&push, 3, Sides::default());
                 });
+                cmd.use_image(&screen, Use::Sampled);
             });
         })?;
-        let texels = commands.read_image(&screen)?;
-        Ok((bytemuck::allocation::pod_collect_to_vec(&texels), time))
+        Ok((screen, time))
     }
 }

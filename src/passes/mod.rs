@@ -172,7 +172,7 @@ impl Renderer {
     /// Begins a picture that grows round by round; the plan is that of the last change.
     pub fn begin(&self, plan: &Plan) -> crate::Result<Refinement> {
         Ok(Refinement {
-            targets: Targets::new(self.commands.gpu(), plan.size, &self.resources, plan.model)?,
+            targets: Targets::new(self.commands.gpu(), plan, &self.resources)?,
             rounds: sampling::rounds(plan),
             plan: plan.clone(),
             samples: 0,
@@ -192,11 +192,11 @@ impl Renderer {
         Ok(true)
     }
 
-    /// What a screen shows of the picture, after a round at least.
-    pub fn display(&mut self, picture: &mut Refinement) -> crate::Result<Vec<[u8; 4]>> {
-        let (pixels, times) = self.passes.display.run(&mut self.commands, &picture.targets, &picture.plan)?;
+    /// What a screen shows of the picture, after a round at least: sRGB values, ready to be sampled.
+    pub fn display(&mut self, picture: &mut Refinement) -> crate::Result<Image> {
+        let (image, times) = self.passes.display.run(&mut self.commands, &picture.targets, &picture.plan)?;
         picture.times.add(times);
-        Ok(pixels)
+        Ok(image)
     }
 
     /// The next render goes by `plan`, which differs from the one before in samples, seed, depth, cut-off and tolerance alone.
@@ -210,7 +210,7 @@ impl Renderer {
         let Self { commands, resources, passes, trace, .. } = self;
         let (trace, set_up) = (*trace, self.set_up);
         let gpu = commands.gpu().clone();
-        let targets = Targets::new(&gpu, plan.size, resources, plan.model)?;
+        let targets = Targets::new(&gpu, plan, resources)?;
         let checkpoint = match &plan.checkpoint {
             Some(path) => Some(Checkpoint::new(path, checkpoint::key(&gpu, plan, trace, resources.fingerprint))?),
             None => None,
@@ -222,6 +222,7 @@ impl Renderer {
 
         let (display, time) = passes.display.run(commands, &targets, plan)?;
         times.add(time);
+        let display = bytemuck::allocation::pod_collect_to_vec(&commands.read_image(&display)?);
         let mean = commands.read_image(&targets.mean)?;
         let radiance = radiance(&mean)?;
         let counts = targets.counts(commands, &mean, samples)?;
@@ -318,7 +319,7 @@ impl Passes {
     fn new(commands: &mut Commands, resources: &Resources, plan: &Plan, trace: Option<Trace>) -> crate::Result<Self> {
         let gpu = commands.gpu().clone();
         let small = Size { width: 16, height: 16 };
-        let targets = Targets::new(&gpu, small, resources, plan.model)?;
+        let targets = Targets::new(&gpu, &Plan { size: small, budget: Budget::Samples(2), ..plan.clone() }, resources)?;
         let model = match (&targets.model, trace) {
             (ModelTargets::Tree(tree), Some(trace)) => {
                 ModelPass::Tree(Box::new(Tree::new(commands, resources, tree, trace)?))
@@ -427,7 +428,9 @@ impl Passes {
             (ModelPass::Raster(raster), _) => Ok(commands.run(|cmd| {
                 cmd.timed("single", |cmd| raster.single.record(cmd, resources, targets, draws, push));
                 cmd.timed("environment", |cmd| raster.environment.record(cmd, resources, targets, push));
-                cmd.timed("accumulate", |cmd| raster.accumulate.record(cmd, targets, push.sample_index));
+                if !Arc::ptr_eq(&targets.mean, &targets.radiance) {
+                    cmd.timed("accumulate", |cmd| raster.accumulate.record(cmd, targets, push.sample_index));
+                }
             })?),
             (ModelPass::Double(pass, environment), ModelTargets::Double(double)) => Ok(commands.run(|cmd| {
                 cmd.timed("double", |cmd| pass.record(cmd, resources, targets, double, draws, push));
@@ -459,14 +462,19 @@ enum ModelTargets {
 }
 
 impl Targets {
-    fn new(gpu: &Gpu, Size { width, height }: Size, resources: &Resources, model: Model) -> Result<Self> {
+    fn new(gpu: &Gpu, plan: &Plan, resources: &Resources) -> Result<Self> {
+        let Size { width, height } = plan.size;
         let image = |name, format, uses| Image::new(gpu, &ImageDesc { name, width, height, format, uses });
-        let radiance = Arc::new(image("radiance", RADIANCE, &[Use::ColorTarget, Use::Sampled])?);
-        let uses = &[Use::Storage, Use::Sampled, Use::CopySource, Use::CopyTarget];
-        let mean = Arc::new(image("mean", RADIANCE, uses)?);
+        let uses = [Use::ColorTarget, Use::Storage, Use::Sampled, Use::CopySource, Use::CopyTarget];
+        let radiance = Arc::new(image("radiance", RADIANCE, &uses)?);
+        // Of one sample, what is drawn is the mean.
+        let mean = match (plan.model, plan.budget) {
+            (Model::Single, Budget::Samples(1)) => radiance.clone(),
+            _ => Arc::new(image("mean", RADIANCE, &uses[1..])?),
+        };
         let depth = image("depth", Format::Depth32, &[Use::DepthTarget])?;
         let accumulation = vec![Bind::Sampled(radiance.clone()), Bind::Storage(mean.clone())];
-        let model = match model {
+        let model = match plan.model {
             Model::Tree => ModelTargets::Tree(TreeTargets::new(gpu, resources, &mean)?),
             Model::Path => ModelTargets::Path(PathTargets::new(gpu, resources, &mean)?),
             Model::Double => ModelTargets::Double(Box::new(DoubleTargets::new(gpu, resources, &radiance, &mean)?)),

@@ -105,7 +105,7 @@ struct Shown {
     worker: Worker,
     screen: Screen,
     egui: egui_winit::State,
-    texture: Option<egui::TextureHandle>,
+    texture: Option<egui::TextureId>,
     /// When something changed last, until the whole picture is asked for.
     changed: Option<Instant>,
     next: Option<Instant>,
@@ -154,15 +154,7 @@ impl App {
         let Some(shown) = &mut self.shown else { return Ok(()) };
         match shown.worker.news() {
             Some(News::Picture(picture)) => {
-                let size = [picture.size.width as usize, picture.size.height as usize];
-                let image = egui::ColorImage::from_rgba_unmultiplied(size, picture.pixels.as_flattened());
-                match &mut shown.texture {
-                    Some(texture) => texture.set(image, egui::TextureOptions::LINEAR),
-                    none => {
-                        let context = shown.egui.egui_ctx();
-                        *none = Some(context.load_texture("picture", image, egui::TextureOptions::LINEAR));
-                    }
-                }
+                shown.texture = Some(shown.screen.set_picture(0, picture.image.clone())?);
                 self.state.picture = Some(picture);
             }
             Some(News::Failed(error)) => self.state.error = Some(error),
@@ -171,7 +163,7 @@ impl App {
         }
         let input = shown.egui.take_egui_input(&shown.window);
         let dropped: Vec<_> = input.dropped_files.iter().map(|file| file.path().to_path_buf()).collect();
-        let (state, texture) = (&mut self.state, shown.texture.as_ref());
+        let (state, texture) = (&mut self.state, shown.texture);
         let mut changes = false;
         for path in dropped {
             let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());

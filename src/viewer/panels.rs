@@ -1,7 +1,7 @@
 //! The windows within the window. Each says whether it changed anything that a picture shows.
 
 use egui::{
-    Align2, Color32, ComboBox, DragValue, Rect, Response, RichText, Slider, SliderClamping, TextureHandle, Ui, Window,
+    Align2, Color32, ComboBox, DragValue, Rect, Response, RichText, Slider, SliderClamping, TextureId, Ui, Window,
     pos2, vec2,
 };
 
@@ -10,7 +10,7 @@ use crate::options::{Model, ModelChoice, Size, Tonemap};
 use crate::scene::{Bounds, Surface};
 
 /// All of them, around the picture.
-pub(super) fn all(ui: &mut Ui, state: &mut State, texture: Option<&TextureHandle>) -> bool {
+pub(super) fn all(ui: &mut Ui, state: &mut State, texture: Option<TextureId>) -> bool {
     let mut changes = picture(ui, state, texture);
     let context = ui.ctx().clone();
     let window =
@@ -27,7 +27,7 @@ pub(super) fn all(ui: &mut Ui, state: &mut State, texture: Option<&TextureHandle
 }
 
 /// The picture behind all, with the camera in the pointer's hands.
-fn picture(ui: &mut Ui, state: &mut State, texture: Option<&TextureHandle>) -> bool {
+fn picture(ui: &mut Ui, state: &mut State, texture: Option<TextureId>) -> bool {
     let area = ui.max_rect();
     let scale = ui.ctx().pixels_per_point();
     let mut changes = false;
@@ -46,7 +46,7 @@ fn picture(ui: &mut Ui, state: &mut State, texture: Option<&TextureHandle>) -> b
         let place = Rect::from_center_size(area.center(), whole * fits);
         let place = place.translate((place.min.to_vec2() * scale).round() / scale - place.min.to_vec2());
         let all = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-        ui.painter().image(texture.id(), place, all, Color32::WHITE);
+        ui.painter().image(texture, place, all, Color32::WHITE);
     }
     changes | camera(ui, &response, state, area.height())
 }

@@ -10,7 +10,7 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use crate::gpu::{Gpu, GpuError, PassTime};
+use crate::gpu::{Gpu, GpuError, Image, PassTime};
 use crate::options::{RenderArgs, Size};
 use crate::passes::Renderer;
 use crate::plan::{Budget, Plan};
@@ -44,7 +44,7 @@ pub(super) struct Picture {
     pub(super) size: Size,
     /// The size of what it stands for.
     pub(super) whole: Size,
-    pub(super) pixels: Vec<[u8; 4]>,
+    pub(super) image: Arc<Image>,
     pub(super) samples: u32,
     /// How many there will be; `None` where that is not known.
     pub(super) of: Option<u32>,
@@ -258,7 +258,7 @@ impl Work {
             if !more && of == Some(picture.samples()) {
                 return Ok(());
             }
-            let pixels = renderer.display(&mut picture)?;
+            let image = Arc::new(renderer.display(&mut picture)?);
             if shown.is_none() {
                 let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(picture.samples());
                 self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
@@ -269,7 +269,7 @@ impl Work {
             let news = News::Picture(Picture {
                 size: plan.size,
                 whole,
-                pixels,
+                image,
                 samples: picture.samples(),
                 of,
                 passes: picture.passes().to_vec(),
