@@ -1,8 +1,13 @@
 //! What a moment of the viewer costs: `cargo bench --bench viewer` moves the camera and prints, of each model, how long the scene, the
-//! targets, a sample and the display take on the host, and how much of that the passes are. Names of models choose.
+//! targets, a sample and the display take on the host, and how much of that the passes are. Then it drags in the viewer's window, under
+//! Xvfb at 1280x720, and prints how often pictures come and how long after the events. Names of models choose.
+
+#[allow(dead_code, reason = "the tests use the rest")]
+#[path = "../tests/common/desktop.rs"]
+mod desktop;
 
 use std::error::Error;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use glam::{DQuat, DVec3};
 
@@ -49,7 +54,7 @@ fn main() -> Result<(), Box<dyn Error>> {
                 marks.push(Instant::now());
                 let mut picture = renderer.begin(&plan)?;
                 marks.push(Instant::now());
-                renderer.advance(&mut picture)?;
+                renderer.advance(&mut picture, &mut || true)?;
                 marks.push(Instant::now());
                 renderer.display(&mut picture)?;
                 marks.push(Instant::now());
@@ -67,6 +72,42 @@ fn main() -> Result<(), Box<dyn Error>> {
                 passes.join(", ")
             );
         }
+    }
+    let models: Vec<_> =
+        Model::ALL.into_iter().filter(|m| names.is_empty() || names.iter().any(|n| n == m.name())).collect();
+    println!("\n| model | pictures a second: median | worst of 95 % | ms after an event: median | 95 % | stand-ins |");
+    println!("| --- | --- | --- | --- | --- | --- |");
+    for model in models {
+        let folder = tempfile::tempdir()?;
+        let stats = folder.path().join("stats.json");
+        let arguments = ["--model", model.name(), "--stats", &stats.display().to_string()];
+        let Some(window) = desktop::Desktop::open([1280, 720], &arguments) else { return Ok(()) };
+        std::thread::sleep(Duration::from_secs(8));
+        let middle = [640, 360];
+        window.event(desktop::Desktop::MOVE, 0, middle);
+        window.event(desktop::Desktop::DOWN, 1, [0, 0]);
+        let start = Instant::now();
+        while start.elapsed() < Duration::from_secs(6) {
+            let angle = start.elapsed().as_secs_f64();
+            let place = [640.0 + 150.0 * angle.sin(), 360.0 + 60.0 * (0.7 * angle).sin()];
+            window.quick_event(desktop::Desktop::MOVE, 0, place.map(|x| x as i16));
+        }
+        window.event(desktop::Desktop::UP, 1, [0, 0]);
+        std::thread::sleep(Duration::from_secs(1));
+        window.close();
+        let report: serde_json::Value = serde_json::from_str(&std::fs::read_to_string(&stats)?)?;
+        let number = |spread: &str, member: &str| report[spread][member].as_f64().unwrap_or(f64::NAN);
+        println!(
+            "| {} | {:.1} | {:.1} | {:.0} | {:.0} | {} of {} |",
+            model.name(),
+            1e3 / number("interval_ms", "median"),
+            1e3 / number("interval_ms", "p95"),
+            number("latency_ms", "median"),
+            number("latency_ms", "p95"),
+            report["stand_ins"],
+            report["pictures"]
+        );
+        println!("{report}");
     }
     Ok(())
 }

@@ -292,6 +292,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "FILE")]
     pub env: Option<PathBuf>,
 
+    /// Sets one value of the scene, as its file would: camera.target=[0,1,0], material.glass.ior=1.7, environment.rotation=90; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub set: Option<Vec<String>>,
+
     /// Exposure of a PNG in stops [default: 0]
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = range::exposure)]
     pub exposure: Option<f64>,
@@ -342,10 +346,12 @@ pub struct RenderArgs {
 }
 
 impl RenderArgs {
-    /// The names of all options.
+    /// The names of all options that a scene's `[render]` table may have.
     pub fn names() -> Vec<String> {
         let command = Self::augment_args(clap::Command::new("render"));
-        command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned)).collect()
+        let names = command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned));
+        // What it would set stands in the file itself.
+        names.filter(|name| name != "set").collect()
     }
 
     /// One option, as it would be given on the command line. An error is one line.
@@ -373,6 +379,7 @@ impl RenderArgs {
             ior: self.ior.or(fallback.ior),
             roughness: self.roughness.or(fallback.roughness),
             env: self.env.or(fallback.env),
+            set: self.set.or(fallback.set),
             exposure: self.exposure.or(fallback.exposure),
             tonemap: self.tonemap.or(fallback.tonemap),
             aov: self.aov.or(fallback.aov),
@@ -415,14 +422,9 @@ impl Display for RenderArgs {
             ("reflection-intensity", text(self.reflection_intensity.as_ref().map(|x| x as _))),
             ("flipped-ratio", text(self.flipped_ratio.as_ref().map(|x| x as _))),
         ];
-        let mut separator = "";
-        for (name, value) in given {
-            if let Some(value) = value {
-                write!(f, "{separator}--{name}={value}")?;
-                separator = " ";
-            }
-        }
-        Ok(())
+        let given = given.into_iter().filter_map(|(name, value)| value.map(|value| format!("--{name}={value}")));
+        let settings = self.set.iter().flatten().map(|setting| format!("--set={setting}"));
+        f.write_str(&given.chain(settings).collect::<Vec<_>>().join(" "))
     }
 }
 

@@ -65,11 +65,20 @@ struct Changes {
     /// Environment image in place of the scene's
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
+
+    /// Sets one value of the scene, as its file would: camera.target=[0,1,0], material.glass.ior=1.7, environment.rotation=90; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<String>,
 }
 
 impl Changes {
     fn overrides(&self) -> Overrides {
-        Overrides { ior: self.ior, roughness: self.roughness, environment: self.env.clone() }
+        Overrides {
+            ior: self.ior,
+            roughness: self.roughness,
+            environment: self.env.clone(),
+            settings: self.set.clone(),
+        }
     }
 }
 

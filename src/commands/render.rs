@@ -47,12 +47,7 @@ impl RenderCommand {
         let format = ImageFormat::of(output)?;
         let output = OutputFile::new(output)?;
 
-        let overrides = Overrides {
-            ior: self.options.ior,
-            roughness: self.options.roughness,
-            environment: self.options.env.clone(),
-        };
-        let mut scene = Scene::load(self.scene.as_deref(), &overrides)?;
+        let mut scene = Scene::load(self.scene.as_deref(), &Overrides::of(&self.options))?;
         let load = start.elapsed();
         let mut plan = self.plan(&scene, format)?;
         scene.frame(f64::from(plan.size.width) / f64::from(plan.size.height));

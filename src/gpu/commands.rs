@@ -3,6 +3,7 @@
 use std::marker::PhantomData;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, PoisonError};
+use std::time::Duration;
 
 use ash::vk;
 use bytemuck::NoUninit;
@@ -47,6 +48,7 @@ pub struct Commands {
     queries: vk::QueryPool,
     /// What is set ends the work: nothing more is submitted.
     interrupt: Option<Arc<AtomicBool>>,
+    patience: Duration,
     gpu: Gpu,
 }
 
@@ -59,6 +61,7 @@ impl Commands {
             fence: vk::Fence::null(),
             queries: vk::QueryPool::null(),
             interrupt: None,
+            patience: Duration::from_millis(100),
             gpu: gpu.clone(),
         };
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(gpu.info().queue_family);
@@ -78,6 +81,16 @@ impl Commands {
     /// From now on nothing is submitted while `interrupt` is set: [`GpuError::Interrupted`].
     pub fn interrupt_by(&mut self, interrupt: Arc<AtomicBool>) {
         self.interrupt = Some(interrupt);
+    }
+
+    /// How long one submission should take, where work can be cut.
+    pub fn patience(&self) -> Duration {
+        self.patience
+    }
+
+    /// From now on one submission should take no longer than that, where work can be cut.
+    pub fn set_patience(&mut self, patience: Duration) {
+        self.patience = patience;
     }
 
     /// The device.

@@ -24,6 +24,7 @@ mod slices;
 mod tree;
 mod view;
 
+use std::ops::ControlFlow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
@@ -31,7 +32,7 @@ use std::time::{Duration, Instant};
 use crate::gpu::{
     Bind, BindGroup, Commands, DeviceKind, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Result, SamplePush, Use,
 };
-use crate::options::{Model, Size, Trace};
+use crate::options::{Model, Size, Tonemap, Trace};
 use crate::plan::{Budget, Plan};
 use crate::scene::Scene;
 
@@ -42,10 +43,11 @@ use display::Display;
 use double::{Double, DoubleTargets};
 use environment::EnvironmentPass;
 use geometry::Draw;
-use path::{AfterRows, Path, PathTargets};
+use path::{Path, PathTargets};
 use resources::Resources;
 use sampling::Round;
 use single::Single;
+use slices::AfterRows;
 use tree::{Tree, TreeTargets};
 
 pub use aov::Aovs;
@@ -174,22 +176,57 @@ impl Renderer {
         Ok(Refinement {
             targets: Targets::new(self.commands.gpu(), plan, &self.resources)?,
             rounds: sampling::rounds(plan),
+            under_way: None,
+            start: Instant::now(),
             plan: plan.clone(),
+            done: 0,
             samples: 0,
+            is_enough: false,
             times: Times::default(),
         })
     }
 
-    /// One round more; false where there was none.
-    pub fn advance(&mut self, picture: &mut Refinement) -> crate::Result<bool> {
-        let Some(round) = picture.rounds.next() else { return Ok(false) };
-        let (resources, targets) = (&self.resources, &picture.targets);
-        let nothing = &mut |_: &mut Commands, _| Ok(());
-        let times =
-            self.passes.sample(&mut self.commands, resources, targets, &resources.draws, round.push, nothing)?;
+    /// Goes on with the picture until all its pixels have as many samples, or, of models that trace, until `goes_on` is false.
+    pub fn advance(&mut self, picture: &mut Refinement, goes_on: &mut dyn FnMut() -> bool) -> crate::Result<Step> {
+        if picture.is_enough {
+            return Ok(Step::Whole);
+        }
+        let Some((round, first_row)) = picture.under_way.take().or_else(|| Some((picture.rounds.next()?, 0))) else {
+            picture.is_enough = true;
+            return Ok(Step::Whole);
+        };
+        let (commands, resources, targets) = (&mut self.commands, &self.resources, &picture.targets);
+        let height = targets.mean.height();
+        let mut rows = if picture.plan.model.traces() { first_row } else { height };
+        let mut after = |_: &mut Commands, done| {
+            rows = done;
+            Ok(if done < height && !goes_on() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        };
+        let push = SamplePush { first_row, ..round.push };
+        let times = self.passes.sample(commands, resources, targets, &resources.draws, push, &mut after)?;
         picture.times.add(times);
+        if rows < height {
+            picture.under_way = Some((round, rows));
+            return Ok(Step::Paused);
+        }
         picture.samples += round.samples;
-        Ok(true)
+        picture.done += 1;
+        let (plan, done) = (&picture.plan, picture.done);
+        let all = plan.budget == Budget::Samples(picture.samples);
+        picture.is_enough = all
+            || is_spent(plan.budget, Duration::ZERO, picture.start.elapsed(), done)
+            || is_precise(commands, targets, plan, done)?;
+        Ok(Step::Round)
+    }
+
+    /// From now on work is submitted in pieces of about that time, where it can be cut.
+    pub fn set_patience(&mut self, patience: Duration) {
+        self.commands.set_patience(patience);
+    }
+
+    /// Mean radiance of each pixel, after a round at least.
+    pub fn radiance(&mut self, picture: &Refinement) -> crate::Result<Vec<[f32; 3]>> {
+        Ok(radiance(&self.commands.read_image(&picture.targets.mean)?)?)
     }
 
     /// What a screen shows of the picture, after a round at least: sRGB values, ready to be sampled.
@@ -253,15 +290,42 @@ impl Renderer {
 pub struct Refinement {
     plan: Plan,
     targets: Targets,
-    rounds: Box<dyn Iterator<Item = Round>>,
+    rounds: Box<dyn Iterator<Item = Round> + Send>,
+    /// The round that was left, and how many of its rows are done.
+    under_way: Option<(Round, u32)>,
+    start: Instant,
+    /// Rounds so far.
+    done: u32,
     samples: u32,
+    is_enough: bool,
     times: Times,
+}
+
+/// How far [`Renderer::advance`] came.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Step {
+    /// In the middle of a round.
+    Paused,
+    /// All pixels have as many samples.
+    Round,
+    /// There was nothing left to do.
+    Whole,
 }
 
 impl Refinement {
     /// Samples per pixel so far.
     pub fn samples(&self) -> u32 {
         self.samples
+    }
+
+    /// Whether it has all that its plan asks for.
+    pub fn is_whole(&self) -> bool {
+        self.is_enough
+    }
+
+    /// From now on it is shown with that exposure, in stops, and tone curve.
+    pub fn set_look(&mut self, exposure: f64, tonemap: Tonemap) {
+        (self.plan.exposure, self.plan.tonemap) = (exposure, tonemap);
     }
 
     /// Device time of each pass so far.
@@ -350,7 +414,8 @@ impl Passes {
             resources.draws.iter().take(1).map(|draw| Draw { vertices: draw.vertices.min(3), ..*draw }).collect();
         if let Some(Round { push, .. }) = sampling::rounds(plan).next() {
             let push = SamplePush { samples_in_batch: 1, ..push };
-            passes.sample(commands, resources, &targets, &few, push, &mut |_, _| Ok(()))?;
+            let mut after = |_: &mut Commands, _| Ok(ControlFlow::Continue(()));
+            passes.sample(commands, resources, &targets, &few, push, &mut after)?;
         }
         passes.display.run(commands, &targets, plan)?;
         if let Some(aov) = &passes.aov {
@@ -391,12 +456,11 @@ impl Passes {
             }
             let first_row = if rounds == begun.rounds + 1 { begun.rows } else { 0 };
             let push = SamplePush { first_row, ..round.push };
-            let mut after = |commands: &mut Commands, rows| match &mut checkpoint {
-                Some(checkpoint) if checkpoint.is_due() => {
+            let mut after = |commands: &mut Commands, rows| {
+                if let Some(checkpoint) = checkpoint.as_mut().filter(|checkpoint| checkpoint.is_due()) {
                     checkpoint.save(commands, &state, Progress::within(rounds, rows, plan.size.height));
-                    Ok(())
                 }
-                _ => Ok(()),
+                Ok(ControlFlow::Continue(()))
             };
             sampled.times.add(self.sample(commands, resources, targets, &resources.draws, push, &mut after)?);
             sampled.samples += round.samples;
@@ -423,7 +487,7 @@ impl Passes {
         after: &mut AfterRows<'_>,
     ) -> crate::Result<Vec<PassTime>> {
         match (&mut self.model, &targets.model) {
-            (ModelPass::Tree(pass), ModelTargets::Tree(tree)) => Ok(pass.sample(commands, targets, tree, push)?),
+            (ModelPass::Tree(pass), ModelTargets::Tree(tree)) => pass.sample(commands, targets, tree, push, after),
             (ModelPass::Path(pass), ModelTargets::Path(path)) => pass.batch(commands, targets, path, push, after),
             (ModelPass::Raster(raster), _) => Ok(commands.run(|cmd| {
                 cmd.timed("single", |cmd| raster.single.record(cmd, resources, targets, draws, push));

@@ -4,15 +4,12 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::resources::Resources;
-use super::slices::{GROUP, Slices};
+use super::slices::{AfterRows, GROUP, Slices};
 use super::{RADIANCE, Targets};
 use crate::gpu::{
     Bind, BindGroup, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result, SamplePush, Use, shaders,
 };
 use crate::options::Trace;
-
-/// Hears how many rows of a batch are done.
-pub(super) type AfterRows<'a> = dyn FnMut(&mut Commands, u32) -> crate::Result<()> + 'a;
 
 pub(super) struct Path {
     pipeline: ComputePipeline,
@@ -57,7 +54,7 @@ impl Path {
         Ok(Self { pipeline, slices: Slices::new() })
     }
 
-    /// One batch of samples of every pixel from row `push.first_row` on, in slices of rows; `after` hears of each how many rows are done.
+    /// One batch of samples of every pixel from row `push.first_row` on, in slices of rows, until `after` says so.
     pub(super) fn batch(
         &mut self,
         commands: &mut Commands,
@@ -82,8 +79,10 @@ impl Path {
                 });
             })?);
             first_row += rows;
-            self.slices.took(rows, start.elapsed(), height);
-            after(commands, first_row.min(height))?;
+            self.slices.took(rows, start.elapsed(), height, commands.patience());
+            if after(commands, first_row.min(height))?.is_break() {
+                break;
+            }
         }
         Ok(times)
     }

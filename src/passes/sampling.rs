@@ -19,7 +19,7 @@ const PLASTIC: DVec2 = DVec2::new(0.754_877_666_246_692_8, 0.569_840_290_998_053
 ///
 /// With a known number of samples they form a lattice, else a sequence; a single sample lies at the centre. A seed
 /// other than 0 moves them all, around the pixel's edges.
-pub fn pixel_offsets(budget: Budget, seed: u64) -> Box<dyn Iterator<Item = DVec2>> {
+pub fn pixel_offsets(budget: Budget, seed: u64) -> Box<dyn Iterator<Item = DVec2> + Send> {
     let shift = shift(seed);
     let place = move |point: DVec2| (point + shift).fract_gl() - 0.5;
     match budget {
@@ -41,7 +41,7 @@ pub(super) struct Round {
 }
 
 /// The rounds of a render, as many as it may have.
-pub(super) fn rounds(plan: &Plan) -> Box<dyn Iterator<Item = Round>> {
+pub(super) fn rounds(plan: &Plan) -> Box<dyn Iterator<Item = Round> + Send> {
     let (budget, size, seed) = (plan.budget, plan.size, plan.seed);
     if plan.model == Model::Path {
         return Box::new(batches(budget));

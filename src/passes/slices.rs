@@ -1,9 +1,12 @@
 //! Pictures in slices of rows: a GPU's watchdog stays calm, and so does whoever waits at the screen.
 
+use std::ops::ControlFlow;
 use std::time::Duration;
 
-/// How long one submission should take.
-const SLICE: Duration = Duration::from_millis(100);
+use crate::gpu::Commands;
+
+/// Hears after each slice how many rows are done, and says whether to go on.
+pub(super) type AfterRows<'a> = dyn FnMut(&mut Commands, u32) -> crate::Result<ControlFlow<()>> + 'a;
 
 /// Rows of a workgroup.
 pub(super) const GROUP: u32 = 8;
@@ -23,11 +26,11 @@ impl Slices {
         self.rows.min(left.next_multiple_of(GROUP))
     }
 
-    /// Learns from a slice of so many rows of a picture of such a height.
-    pub(super) fn took(&mut self, rows: u32, time: Duration, height: u32) {
-        if time < SLICE / 2 {
+    /// Learns from a slice of so many rows of a picture of such a height, where one should take `aim`.
+    pub(super) fn took(&mut self, rows: u32, time: Duration, height: u32, aim: Duration) {
+        if time < aim / 2 {
             self.rows = rows.saturating_mul(2).min(height.next_multiple_of(GROUP));
-        } else if time > SLICE * 2 {
+        } else if time > aim * 2 {
             self.halve(rows);
         }
     }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::resources::Resources;
-use super::slices::{GROUP, Slices};
+use super::slices::{AfterRows, GROUP, Slices};
 use super::{RADIANCE, Targets};
 use crate::gpu::{
     Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result,
@@ -122,18 +122,20 @@ impl Tree {
         Ok(Self { pipeline: pipeline(tree)?, lights, slices: Slices::new(), columns: u32::MAX })
     }
 
-    /// One sample of every pixel, in slices of rows; where those leave more points than there is room for, in parts of rows.
+    /// One sample of every pixel from row `push.first_row` on, in slices of rows, until `after` says so; where those leave more points
+    /// than there is room for, in parts of rows.
     pub(super) fn sample(
         &mut self,
         commands: &mut Commands,
         targets: &Targets,
         tree: &TreeTargets,
         push: SamplePush,
-    ) -> Result<Vec<PassTime>> {
+        after: &mut AfterRows<'_>,
+    ) -> crate::Result<Vec<PassTime>> {
         let (width, height) = (targets.mean.width(), targets.mean.height());
         let most_rows = (MOST_SAMPLES / width / GROUP).max(1) * GROUP;
         let mut times = Vec::new();
-        let (mut first_row, mut first_column) = (0, 0);
+        let (mut first_row, mut first_column) = (push.first_row, 0);
         while first_row < height {
             let rows = if first_column == 0 { self.slices.next((height - first_row).min(most_rows)) } else { GROUP };
             let columns = if rows > GROUP { width } else { self.columns.min(width - first_column) };
@@ -169,7 +171,10 @@ impl Tree {
             first_column += columns;
             if first_column >= width {
                 (first_row, first_column) = (first_row + rows, 0);
-                self.slices.took(rows, start.elapsed(), height);
+                self.slices.took(rows, start.elapsed(), height, commands.patience());
+                if after(commands, first_row.min(height))?.is_break() {
+                    break;
+                }
             }
         }
         Ok(times)

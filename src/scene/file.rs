@@ -117,10 +117,12 @@ struct Reader<'a> {
     folder: &'a Path,
 }
 
-const DIELECTRIC_KEYS: [&str; 8] =
+/// The keys of a dielectric, its kind first.
+pub const DIELECTRIC_KEYS: [&str; 8] =
     ["kind", "ior", "roughness", "dispersion", "attenuation_color", "attenuation_distance", "thin_walled", "priority"];
 
-const OPAQUE_KEYS: [&str; 7] =
+/// The keys of an opaque material.
+pub const OPAQUE_KEYS: [&str; 7] =
     ["kind", "base_color", "base_color_texture", "metallic", "roughness", "specular", "emission"];
 
 #[derive(Clone, Copy)]
@@ -265,25 +267,32 @@ impl ObjectTable<'_> {
     }
 }
 
-fn dielectric(table: &Table<'_>) -> Result<Surface> {
-    let clear = Dielectric::default();
-    // A glass brings its dispersion along.
-    let index = |entry: Entry<'_>| match entry.as_text() {
+/// An index, and the dispersion that a named glass brings along.
+pub fn index_of(entry: Entry<'_>) -> Result<(f64, Dispersion)> {
+    match entry.as_text() {
         Some(name) => match Glass::named(name) {
             Ok(glass) => Ok((glass.ior, glass.dispersion)),
             Err(message) => Err(entry.error(message)),
         },
         None => Ok((entry.number(&INDEX)?, Dispersion::None)),
-    };
-    let (ior, own) = table.or("ior", (clear.ior, clear.dispersion), index)?;
-    let dispersion = |entry: Entry<'_>| match entry.number(&LIGHT)? {
+    }
+}
+
+/// 20 / Abbe number.
+pub fn dispersion_of(entry: Entry<'_>) -> Result<Dispersion> {
+    match entry.number(&LIGHT)? {
         0.0 => Ok(Dispersion::None),
         number => Ok(Dispersion::Khr(number)),
-    };
+    }
+}
+
+fn dielectric(table: &Table<'_>) -> Result<Surface> {
+    let clear = Dielectric::default();
+    let (ior, own) = table.or("ior", (clear.ior, clear.dispersion), index_of)?;
     Ok(Surface::Dielectric(Dielectric {
         ior,
         roughness: table.or("roughness", clear.roughness, |entry| entry.number(&UNIT))?,
-        dispersion: table.or("dispersion", own, dispersion)?,
+        dispersion: table.or("dispersion", own, dispersion_of)?,
         attenuation_color: table.or("attenuation_color", clear.attenuation_color, |entry| entry.triple(&UNIT))?,
         attenuation_distance: table
             .or("attenuation_distance", clear.attenuation_distance, |entry| entry.number(&POSITIVE_OR_INFINITE))?,

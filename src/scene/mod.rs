@@ -17,6 +17,7 @@ mod mesh;
 mod mtl;
 mod obj;
 mod obj_text;
+mod settings;
 mod table;
 mod texture;
 mod topology;
@@ -104,6 +105,8 @@ pub struct Overrides {
     pub roughness: Option<f64>,
     /// Environment image.
     pub environment: Option<PathBuf>,
+    /// Single values, as [`Scene::set`] takes them; they win over the others.
+    pub settings: Vec<String>,
 }
 
 impl Scene {
@@ -135,6 +138,7 @@ impl Scene {
             ior: overrides.ior.or(render.ior),
             roughness: overrides.roughness.or(render.roughness),
             environment: overrides.environment.clone().or_else(|| render.env.clone()),
+            settings: overrides.settings.clone(),
         };
         let framed = camera.is_none();
         let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
@@ -156,7 +160,10 @@ impl Scene {
             Light::Color(color) => Surroundings::Color(color),
         };
         let environment = Environment { light, intensity, rotation, visible };
-        Ok(Self { name, environment, camera, framed, lights, materials, textures, meshes, objects, render, warnings })
+        let mut scene =
+            Self { name, environment, camera, framed, lights, materials, textures, meshes, objects, render, warnings };
+        scene.set(&overrides.settings)?;
+        Ok(scene)
     }
 
     /// Moves a camera that was not given, so that an image that is `aspect` times as wide as high shows all objects.
@@ -243,6 +250,12 @@ fn bare_mesh(path: &Path) -> Result<SceneFile> {
 }
 
 impl Overrides {
+    /// Those among the options of a render.
+    pub fn of(args: &RenderArgs) -> Self {
+        let RenderArgs { ior, roughness, env, set, .. } = args;
+        Self { ior: *ior, roughness: *roughness, environment: env.clone(), settings: set.clone().unwrap_or_default() }
+    }
+
     fn check(&self) -> Result<()> {
         if let Some(ior) = self.ior.filter(|ior| !(1e-6..=1e6).contains(ior)) {
             return Err(Error::Usage(format!(

@@ -3,6 +3,8 @@
 //! `App` takes events and draws; `worker` renders on a thread of its own; `panels` are the windows within the window. What is on the
 //! screen is what `vitrum render` makes of the same options, pixel for pixel.
 
+mod desk;
+mod meter;
 mod orbit;
 mod panels;
 mod worker;
@@ -19,10 +21,12 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy}
 use winit::window::{Window, WindowId};
 
 use crate::gpu::{Gpu, GpuError, Instance, Messages, OnScreen, Screen, Surface};
+use crate::image::OutputFile;
 use crate::options::{RenderArgs, Size};
 use crate::scene::{Camera, Overrides, Scene};
 use crate::{Error, Result};
 
+use meter::Meter;
 use worker::{News, Picture, Wanted, Worker};
 
 /// How long nothing has to change before the whole picture is made.
@@ -45,9 +49,14 @@ pub fn run(options: Options) -> Result<Option<Arc<Messages>>> {
     let mut app =
         App { state, shown: None, proxy: event_loop.create_proxy(), closes: false, end: Ok(()), messages: None };
     event_loop.run_app(&mut app).map_err(none)?;
-    let App { end, messages, shown, .. } = app;
+    let App { end, messages, shown, state, .. } = app;
     drop(shown);
-    end.map(|()| messages)
+    end?;
+    if let Some(file) = &state.args.stats {
+        let report = serde_json::to_string_pretty(&state.meter.report()).unwrap_or_default();
+        OutputFile::new(file)?.write(report.as_bytes())?;
+    }
+    Ok(messages)
 }
 
 /// What is looked at, and how.
@@ -60,14 +69,17 @@ struct State {
     /// What went wrong last, until something else is asked for.
     error: Option<String>,
     picture: Option<Picture>,
+    /// Counts what is looked at: it grows with every change but those of the look.
+    revision: u64,
+    meter: Meter,
 }
 
 impl State {
     fn new(Options { scene: path, args }: Options) -> Result<Self> {
-        let overrides = Overrides { ior: args.ior, roughness: args.roughness, environment: args.env.clone() };
-        let scene = Scene::load(path.as_deref(), &overrides)?;
+        let scene = Scene::load(path.as_deref(), &Overrides::of(&args))?;
         let args = args.or(scene.render.clone());
-        Ok(Self { path, sized: args.size.is_some(), scene, args, error: None, picture: None })
+        let sized = args.size.is_some();
+        Ok(Self { path, sized, scene, args, error: None, picture: None, revision: 0, meter: Meter::default() })
     }
 
     /// Another scene in the place of this one; what cannot be read leaves it, and is said.
@@ -75,7 +87,10 @@ impl State {
         let args = RenderArgs { ior: None, roughness: None, env: None, size: None, ..self.args.clone() };
         let size = self.args.size.filter(|_| self.sized);
         match Self::new(Options { scene: Some(path), args: RenderArgs { size, ..args } }) {
-            Ok(state) => *self = Self { picture: self.picture.take(), ..state },
+            Ok(state) => {
+                let (picture, meter) = (self.picture.take(), std::mem::take(&mut self.meter));
+                *self = Self { picture, meter, revision: self.revision, ..state };
+            }
             Err(error) => self.error = Some(error.in_full()),
         }
         self.error.is_none()
@@ -108,6 +123,10 @@ struct Shown {
     texture: Option<egui::TextureId>,
     /// When something changed last, until the whole picture is asked for.
     changed: Option<Instant>,
+    /// When it was that what was asked for last was asked for.
+    asked: Instant,
+    /// The first event that no frame has heard of yet.
+    heard: Option<Instant>,
     next: Option<Instant>,
     window: Arc<Window>,
 }
@@ -142,24 +161,41 @@ impl App {
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, scale, window.theme(), side);
         let proxy = self.proxy.clone();
         // A loop that has ended needs no news.
-        let worker = Worker::new(gpu, move || {
+        let worker = worker::start(gpu, move || {
             let _ = proxy.send_event(());
         });
         window.request_redraw();
-        Ok(Shown { worker, screen, egui, texture: None, changed: Some(Instant::now()), next: None, window })
+        let now = Instant::now();
+        Ok(Shown {
+            worker,
+            screen,
+            egui,
+            texture: None,
+            changed: Some(now),
+            asked: now,
+            heard: None,
+            next: None,
+            window,
+        })
     }
 
     /// One frame: hears what there is, runs the panels, shows them.
     fn frame(&mut self) -> Result<()> {
         let Some(shown) = &mut self.shown else { return Ok(()) };
-        match shown.worker.news() {
-            Some(News::Picture(picture)) => {
-                shown.texture = Some(shown.screen.set_picture(0, picture.image.clone())?);
-                self.state.picture = Some(picture);
+        let start = Instant::now();
+        let heard = shown.heard.take().unwrap_or(start);
+        let mut new = None;
+        for news in shown.worker.news() {
+            match news {
+                News::Picture(picture) => new = Some(picture),
+                News::Failed(error) => self.state.error = Some(error),
+                News::Lost => return Err(Error::Gpu(GpuError::Lost)),
             }
-            Some(News::Failed(error)) => self.state.error = Some(error),
-            Some(News::Lost) => return Err(Error::Gpu(GpuError::Lost)),
-            None => {}
+        }
+        let timed = new.as_ref().map(|picture| (picture.asked, picture.moving, picture.size != picture.whole));
+        if let Some(picture) = new {
+            shown.texture = Some(shown.screen.set_picture(picture.number, picture.image.clone())?);
+            self.state.picture = Some(picture);
         }
         let input = shown.egui.take_egui_input(&shown.window);
         let dropped: Vec<_> = input.dropped_files.iter().map(|file| file.path().to_path_buf()).collect();
@@ -190,12 +226,17 @@ impl App {
             }
         }
         let now = Instant::now();
+        state.meter.drew(now.duration_since(start));
+        if let Some((asked, moving, stand_in)) = timed {
+            state.meter.showed(asked, moving, stand_in);
+        }
         if changes {
-            shown.changed = Some(now);
-            shown.worker.want(state.wanted(/* moving: */ true));
+            (shown.changed, shown.asked) = (Some(now), heard);
+            state.revision += 1;
+            shown.worker.want(state.wanted(heard, /* moving: */ true));
         } else if shown.changed.is_some_and(|changed| now.duration_since(changed) >= REST) {
             shown.changed = None;
-            shown.worker.want(state.wanted(/* moving: */ false));
+            shown.worker.want(state.wanted(shown.asked, /* moving: */ false));
         }
         let delay = output.viewport_output.values().map(|viewport| viewport.repaint_delay).min();
         let repaint = delay.and_then(|delay| now.checked_add(delay));
@@ -205,11 +246,11 @@ impl App {
 }
 
 impl State {
-    fn wanted(&self, moving: bool) -> Wanted {
+    fn wanted(&self, asked: Instant, moving: bool) -> Wanted {
         let mut scene = self.scene.clone();
         let size = self.size();
         scene.frame(f64::from(size.width) / f64::from(size.height));
-        Wanted { scene, args: self.args.clone(), moving }
+        Wanted { revision: self.revision, scene, shots: vec![self.args.clone()], moving, asked }
     }
 
     fn drag(&mut self, by: impl FnOnce(Camera) -> Camera) {
@@ -255,6 +296,7 @@ impl ApplicationHandler for App {
         }
         let Some(shown) = &mut self.shown else { return };
         if shown.egui.on_window_event(&shown.window, &event).repaint {
+            shown.heard.get_or_insert_with(Instant::now);
             shown.window.request_redraw();
         }
         if event == WindowEvent::CloseRequested {

@@ -1,27 +1,30 @@
-//! What renders while the window waits for nothing. In flow what is wanted, out flow pictures, the coarse ones first.
+//! The thread that renders what the window shows. In flow scenes and options, out flow pictures, the coarse ones first.
 //!
-//! One thread. While something moves it makes stand-ins, as large as a moment allows; at rest the whole picture grows until it has all
-//! of its samples, and then the thread sleeps. Whatever is wanted next ends what grows, but not a stand-in: else a mouse that never
-//! rests would see nothing.
+//! While something moves it makes stand-ins, as large as a moment allows; at rest the whole picture grows until it has all of its
+//! samples, and then the thread sleeps. Whatever is wanted next ends what grows, but not a stand-in: else a mouse that never rests would
+//! see nothing. Another exposure or tone curve ends nothing.
 
 use std::collections::HashMap;
-use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
-use std::thread::JoinHandle;
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::desk::{Hand, Orders};
 use crate::gpu::{Gpu, GpuError, Image, PassTime};
 use crate::options::{RenderArgs, Size};
-use crate::passes::Renderer;
+use crate::passes::{Refinement, Renderer, Step};
 use crate::plan::{Budget, Plan};
 use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// What a stand-in may take.
-const STAND_IN: Duration = Duration::from_millis(50);
+const STAND_IN: Duration = Duration::from_millis(35);
 
-/// The coarsest stand-in: one pixel for so many in each direction.
-const COARSEST: u32 = 16;
+/// How coarse stand-ins can be: pixels of the picture in one of theirs, in each direction.
+const COARSE: [f64; 13] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0];
+
+/// How much finer each further stand-in is, and how fine none is.
+const FINER: f64 = 2.5;
+const FINEST: f64 = 1.5;
 
 /// Milliseconds of a pixel, where nothing is known.
 const SLOW: f64 = 5e-3;
@@ -29,22 +32,30 @@ const SLOW: f64 = 5e-3;
 /// How often a picture is shown while it grows.
 const PERIOD: Duration = Duration::from_millis(150);
 
-/// A picture to be made.
-#[derive(Clone)]
+/// How long a submission should take: whoever moves something waits for its end.
+const PATIENCE: Duration = Duration::from_millis(25);
+
+/// Pictures to be made.
 pub(super) struct Wanted {
+    /// Tells these from others, but for exposures and tone curves.
+    pub(super) revision: u64,
     pub(super) scene: Scene,
-    /// Model, size, samples and the rest.
-    pub(super) args: RenderArgs,
-    /// Whether another follows at once: a stand-in is enough.
+    /// Of each picture model, size, samples and the rest.
+    pub(super) shots: Vec<RenderArgs>,
+    /// Whether more follows at once: stand-ins are enough.
     pub(super) moving: bool,
+    /// When it was asked for.
+    pub(super) asked: Instant,
 }
 
 /// A picture that was made.
 pub(super) struct Picture {
+    /// Which of those that were wanted.
+    pub(super) number: usize,
+    pub(super) image: Arc<Image>,
     pub(super) size: Size,
     /// The size of what it stands for.
     pub(super) whole: Size,
-    pub(super) image: Arc<Image>,
     pub(super) samples: u32,
     /// How many there will be; `None` where that is not known.
     pub(super) of: Option<u32>,
@@ -52,6 +63,9 @@ pub(super) struct Picture {
     pub(super) passes: Vec<PassTime>,
     /// What the model does not simulate, or by something simpler.
     pub(super) lacks: Vec<String>,
+    pub(super) moving: bool,
+    /// When it was asked for.
+    pub(super) asked: Instant,
 }
 
 /// What there is to hear.
@@ -63,69 +77,11 @@ pub(super) enum News {
     Lost,
 }
 
-#[derive(Default)]
-struct Desk {
-    wanted: Option<Wanted>,
-    news: Option<News>,
-    /// Whether what is under way may be left.
-    growing: bool,
-    closed: bool,
-}
+pub(super) type Worker = Hand<Wanted, News>;
 
-struct Shared {
-    desk: Mutex<Desk>,
-    arrived: Condvar,
-    interrupt: Arc<AtomicBool>,
-}
-
-impl Shared {
-    fn desk(&self) -> MutexGuard<'_, Desk> {
-        self.desk.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-/// The thread, seen from the window.
-pub(super) struct Worker {
-    shared: Arc<Shared>,
-    thread: Option<JoinHandle<()>>,
-}
-
-impl Worker {
-    /// `wake` is called whenever there is news.
-    pub(super) fn new(gpu: Gpu, wake: impl Fn() + Send + 'static) -> Self {
-        let shared = Arc::new(Shared { desk: Mutex::default(), arrived: Condvar::new(), interrupt: Arc::default() });
-        let desk = Arc::clone(&shared);
-        let work =
-            move || Work { shared: desk, gpu, renderer: None, speed: HashMap::new(), wake: Box::new(wake) }.run();
-        Self { shared, thread: Some(std::thread::spawn(work)) }
-    }
-
-    /// Makes this picture next, in the place of any that waits.
-    pub(super) fn want(&self, wanted: Wanted) {
-        let mut desk = self.shared.desk();
-        if desk.growing {
-            self.shared.interrupt.store(true, Ordering::Relaxed);
-        }
-        desk.wanted = Some(wanted);
-        self.shared.arrived.notify_all();
-    }
-
-    /// The last there is to hear.
-    pub(super) fn news(&self) -> Option<News> {
-        self.shared.desk().news.take()
-    }
-}
-
-impl Drop for Worker {
-    fn drop(&mut self) {
-        self.shared.desk().closed = true;
-        self.shared.interrupt.store(true, Ordering::Relaxed);
-        self.shared.arrived.notify_all();
-        if let Some(thread) = self.thread.take() {
-            // One that panicked has said so.
-            let _ = thread.join();
-        }
-    }
+/// Starts the thread; `wake` is called whenever there is news.
+pub(super) fn start(gpu: Gpu, wake: impl Fn() + Send + Sync + 'static) -> Worker {
+    Hand::new(wake, |orders| Work { orders, gpu, slots: Vec::new(), speed: HashMap::new() }.run())
 }
 
 /// What a sample takes: so much, and so much for each pixel. Both as the last pictures, a small and a large one, had it.
@@ -142,15 +98,14 @@ impl Speed {
         *(if is_small { &mut self.small } else { &mut self.large }) = Some((pixels, ms));
     }
 
-    /// How many pixels a stand-in may have.
-    fn pixels(&self) -> f64 {
-        let wanted = STAND_IN.as_secs_f64() * 1e3;
+    /// How many pixels a stand-in may have that takes so many milliseconds.
+    fn pixels(&self, wanted: f64) -> f64 {
         match (self.small, self.large) {
             (Some((few, ms)), Some((many, more))) if more > ms && many > few => {
                 let each = (more - ms) / (many - few);
                 let fixed = (ms - each * few).max(0.0);
-                // Where even nothing takes longer, half of what there is.
-                ((wanted - fixed).max(0.25 * wanted)) / each
+                // Where even nothing takes longer, a quarter of what there is.
+                (wanted - fixed).max(0.25 * wanted) / each
             }
             (Some((pixels, ms)), _) | (None, Some((pixels, ms))) => pixels * wanted / ms.max(1e-3),
             (None, None) => wanted / SLOW,
@@ -158,128 +113,179 @@ impl Speed {
     }
 }
 
+/// One of the pictures.
+#[derive(Default)]
+struct Slot {
+    renderer: Option<Renderer>,
+    /// The revision that a stand-in was of last.
+    stood_in: Option<u64>,
+    /// The whole one, as far as it is, and the revision that it is of.
+    whole: Option<(u64, Plan, Refinement)>,
+}
+
 /// The thread, seen from itself.
 struct Work {
-    shared: Arc<Shared>,
+    orders: Orders<Wanted, News>,
     gpu: Gpu,
-    renderer: Option<Renderer>,
+    slots: Vec<Slot>,
     /// What samples took, by model.
     speed: HashMap<&'static str, Speed>,
-    wake: Box<dyn Fn() + Send>,
 }
 
 impl Work {
     fn run(mut self) {
-        while let Some(wanted) = self.next() {
-            let news = match self.make(&wanted) {
-                Ok(()) | Err(Error::Gpu(GpuError::Interrupted)) => continue,
+        while let Some(mut wanted) = self.orders.next() {
+            let news = match self.make(&mut wanted) {
+                Ok(()) => continue,
                 Err(Error::Gpu(GpuError::Lost)) => News::Lost,
                 Err(error) => News::Failed(error.in_full()),
             };
             // What is half made is not trusted.
-            self.renderer = None;
-            self.tell(news);
+            self.slots.clear();
+            self.orders.tell(news);
         }
     }
 
-    /// Waits for what is wanted; `None` at the end.
-    fn next(&self) -> Option<Wanted> {
-        let mut desk = self.shared.desk();
-        desk.growing = false;
-        loop {
-            if desk.closed {
-                return None;
+    fn make(&mut self, wanted: &mut Wanted) -> Result<()> {
+        self.slots.resize_with(wanted.shots.len(), Slot::default);
+        let begun = |slot: &Slot| slot.whole.as_ref().is_some_and(|(revision, ..)| *revision == wanted.revision);
+        if !self.slots.iter().all(begun) {
+            self.slots.iter_mut().for_each(|slot| slot.whole = None);
+            for number in 0..wanted.shots.len() {
+                let coarse = self.coarse(wanted, number)?;
+                let stood_in = self.slots[number].stood_in == Some(wanted.revision);
+                if wanted.moving || coarse > 1.0 && !stood_in {
+                    self.stand_in(wanted, number, coarse, /* leaves: */ false)?;
+                }
             }
-            if let Some(wanted) = desk.wanted.take() {
-                self.shared.interrupt.store(false, Ordering::Relaxed);
-                return Some(wanted);
+            for number in 0..wanted.shots.len() {
+                // Finer ones, where the first round of the whole picture lets wait.
+                let mut coarse = self.coarse(wanted, number)? / FINER;
+                while !wanted.moving && coarse > FINEST && !self.orders.is_late() {
+                    self.stand_in(wanted, number, coarse, /* leaves: */ true)?;
+                    coarse /= FINER;
+                }
             }
-            desk = self.shared.arrived.wait(desk).unwrap_or_else(PoisonError::into_inner);
         }
-    }
-
-    /// Whether something else is wanted already; from here on it would end the work.
-    fn may_grow(&self) -> bool {
-        let mut desk = self.shared.desk();
-        desk.growing = true;
-        desk.wanted.is_none() && !desk.closed
-    }
-
-    fn tell(&self, news: News) {
-        self.shared.desk().news = Some(news);
-        (self.wake)();
-    }
-
-    fn make(&mut self, wanted: &Wanted) -> Result<()> {
-        let whole = Plan::new(&wanted.scene, &wanted.args)?;
-        let speed = self.speed.get(whole.model.name()).copied().unwrap_or_default();
-        let coarse = (whole.size.pixels() / speed.pixels()).sqrt().ceil().clamp(1.0, f64::from(COARSEST)) as u32;
-        if coarse > 1 || wanted.moving {
-            let side = |side: u32| side.div_ceil(coarse);
-            let size = Size { width: side(whole.size.width), height: side(whole.size.height) };
-            let args = RenderArgs { size: Some(size), samples: Some(1), ..wanted.args.clone() };
-            self.grow(wanted, &Plan::new(&wanted.scene, &args)?, whole.size)?;
-        }
-        if !wanted.moving && self.may_grow() {
-            self.grow(wanted, &whole, whole.size)?;
+        for number in 0..wanted.shots.len() {
+            if !wanted.moving && !self.grow(wanted, number)? {
+                return Ok(());
+            }
         }
         Ok(())
     }
 
-    /// Makes a picture, and shows it from time to time.
-    fn grow(&mut self, wanted: &Wanted, plan: &Plan, whole: Size) -> Result<()> {
-        let renderer = match &mut self.renderer {
-            Some(renderer) => {
-                renderer.change(&wanted.scene, plan)?;
-                renderer
-            }
-            none => {
-                let mut renderer = Renderer::new(&self.gpu, &wanted.scene, plan)?;
-                renderer.interrupt_by(Arc::clone(&self.shared.interrupt));
-                none.insert(renderer)
-            }
-        };
-        let of = match plan.budget {
-            Budget::Samples(samples) => Some(samples),
-            Budget::Seconds { .. } => None,
-        };
-        let mut picture = renderer.begin(plan)?;
+    /// How coarse a stand-in has to be to take no longer than one may.
+    fn coarse(&self, wanted: &Wanted, number: usize) -> Result<f64> {
+        let whole = Plan::new(&wanted.scene, &wanted.shots[number])?;
+        let speed = self.speed.get(whole.model.name()).copied().unwrap_or_default();
+        let pixels = speed.pixels(STAND_IN.as_secs_f64() * 1e3 / wanted.shots.len() as f64);
+        let least = (whole.size.pixels() / pixels).sqrt();
+        Ok(COARSE.into_iter().find(|&coarse| coarse >= least).unwrap_or(COARSE[COARSE.len() - 1]))
+    }
+
+    /// One sample of a coarser picture. `leaves`: whether it is left where something else is wanted.
+    fn stand_in(&mut self, wanted: &Wanted, number: usize, coarse: f64, leaves: bool) -> Result<()> {
+        let args = &wanted.shots[number];
+        let whole = Plan::new(&wanted.scene, args)?.size;
+        let side = |side: u32| (f64::from(side) / coarse).ceil() as u32;
+        let size = Size { width: side(whole.width), height: side(whole.height) };
+        let (tolerance, time_budget) = (None, None);
+        let args = RenderArgs { size: Some(size), samples: Some(1), tolerance, time_budget, ..args.clone() };
+        let plan = Plan::new(&wanted.scene, &args)?;
+        self.renderer(wanted, number, &plan)?;
+        let orders = &self.orders;
+        let Some(renderer) = &mut self.slots[number].renderer else { return Ok(()) };
+        let mut picture = renderer.begin(&plan)?;
         let start = Instant::now();
+        if renderer.advance(&mut picture, &mut || !(leaves && orders.is_late()))? == Step::Paused {
+            return Ok(());
+        }
+        let image = renderer.display(&mut picture)?;
+        let ms = start.elapsed().as_secs_f64() * 1e3;
+        self.slots[number].stood_in = Some(wanted.revision);
+        self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
+        self.show(wanted, number, &plan, whole, &picture, image);
+        Ok(())
+    }
+
+    /// The whole picture, with all its samples, shown from time to time; false where something else was wanted before its end.
+    fn grow(&mut self, wanted: &mut Wanted, number: usize) -> Result<bool> {
+        let kept = self.slots[number].whole.take().filter(|(revision, ..)| *revision == wanted.revision);
+        let (plan, mut picture) = match kept {
+            Some((_, plan, picture)) => (plan, picture),
+            None => {
+                let plan = Plan::new(&wanted.scene, &wanted.shots[number])?;
+                let picture = self.renderer(wanted, number, &plan)?.begin(&plan)?;
+                (plan, picture)
+            }
+        };
         let mut shown: Option<Instant> = None;
+        let mut left = false;
         loop {
-            let more = renderer.advance(&mut picture)?;
-            if picture.samples() == 0 || !more && shown.is_none() {
-                return Ok(());
-            }
-            let is_due = shown.is_none_or(|shown| shown.elapsed() > PERIOD);
-            if more && !is_due && of != Some(picture.samples()) {
-                continue;
-            }
-            if !more && of == Some(picture.samples()) {
-                return Ok(());
-            }
-            let image = Arc::new(renderer.display(&mut picture)?);
-            if shown.is_none() {
+            let orders = &self.orders;
+            let Some(renderer) = &mut self.slots[number].renderer else { return Ok(true) };
+            let start = Instant::now();
+            let before = picture.samples();
+            let step = renderer.advance(&mut picture, &mut || !orders.is_late())?;
+            if before == 0 && step == Step::Round {
                 let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(picture.samples());
                 self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
             }
-            shown = Some(Instant::now());
-            let lacks = [(&plan.unsupported, "does not simulate"), (&plan.approximate, "approximates")];
-            let lacks = lacks.into_iter().filter(|(effects, _)| **effects != Default::default());
-            let news = News::Picture(Picture {
-                size: plan.size,
-                whole,
-                image,
-                samples: picture.samples(),
-                of,
-                passes: picture.passes().to_vec(),
-                lacks: lacks.map(|(effects, what)| format!("{what} {}", effects.names().join(", "))).collect(),
-            });
-            self.shared.desk().news = Some(news);
-            (self.wake)();
-            if !more {
-                return Ok(());
+            // The same with another look goes on from here.
+            while let Some(next) = self.orders.next_if(|next| next.revision == wanted.revision && !next.moving) {
+                *wanted = next;
+                shown = None;
+            }
+            left |= self.orders.is_late();
+            let is_due = shown.is_none_or(|shown| shown.elapsed() > PERIOD);
+            if picture.samples() > 0 && step != Step::Paused && (is_due || picture.is_whole()) {
+                let RenderArgs { exposure, tonemap, .. } = wanted.shots[number];
+                picture.set_look(exposure.unwrap_or(0.0), tonemap.unwrap_or_default());
+                let image = renderer.display(&mut picture)?;
+                shown = Some(Instant::now());
+                self.show(wanted, number, &plan, plan.size, &picture, image);
+            }
+            if left || picture.is_whole() {
+                self.slots[number].whole = Some((wanted.revision, plan, picture));
+                return Ok(!left);
             }
         }
+    }
+
+    /// The renderer of a picture, ready for `plan`.
+    fn renderer(&mut self, wanted: &Wanted, number: usize, plan: &Plan) -> Result<&mut Renderer> {
+        let slot = &mut self.slots[number];
+        match &mut slot.renderer {
+            Some(renderer) => {
+                renderer.change(&wanted.scene, plan)?;
+                Ok(renderer)
+            }
+            none => {
+                let mut renderer = Renderer::new(&self.gpu, &wanted.scene, plan)?;
+                renderer.set_patience(PATIENCE);
+                Ok(none.insert(renderer))
+            }
+        }
+    }
+
+    fn show(&self, wanted: &Wanted, number: usize, plan: &Plan, whole: Size, picture: &Refinement, image: Image) {
+        let lacks = [(&plan.unsupported, "does not simulate"), (&plan.approximate, "approximates")];
+        let lacks = lacks.into_iter().filter(|(effects, _)| **effects != Default::default());
+        self.orders.tell(News::Picture(Picture {
+            number,
+            image: Arc::new(image),
+            size: plan.size,
+            whole,
+            samples: picture.samples(),
+            of: match plan.budget {
+                Budget::Samples(samples) => Some(samples),
+                Budget::Seconds { .. } => None,
+            },
+            passes: picture.passes().to_vec(),
+            lacks: lacks.map(|(effects, what)| format!("{what} {}", effects.names().join(", "))).collect(),
+            moving: wanted.moving,
+            asked: wanted.asked,
+        }));
     }
 }

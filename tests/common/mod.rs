@@ -2,6 +2,7 @@
 
 #![allow(dead_code, reason = "each test program uses its share")]
 
+pub mod desktop;
 pub mod pictures;
 pub mod reference;
 pub mod tables;

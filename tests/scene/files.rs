@@ -441,13 +441,18 @@ fn the_command_line_wins_over_render_and_render_over_the_scene() {
     assert_eq!((width(&scene), scene.environment.intensity), (4, 3.0));
     assert_eq!(scene.render.env, Some(folder.path("sky.png")));
 
-    let overrides = Overrides { ior: Some(1.9), roughness: Some(0.0), environment: Some(folder.path("other.png")) };
+    let overrides = Overrides {
+        ior: Some(1.9),
+        roughness: Some(0.0),
+        environment: Some(folder.path("other.png")),
+        ..Overrides::default()
+    };
     let scene = Scene::load(Some(&folder.path("scene.toml")), &overrides).unwrap();
     assert_eq!((dielectric(&scene, 0).ior, dielectric(&scene, 0).roughness), (1.9, 0.0));
     assert_eq!((width(&scene), scene.environment.intensity), (8, 3.0));
 
     for (ior, roughness) in [(Some(0.0), None), (Some(f64::NAN), None), (None, Some(1.5)), (None, Some(f64::NAN))] {
-        let overrides = Overrides { ior, roughness, environment: None };
+        let overrides = Overrides { ior, roughness, ..Overrides::default() };
         assert_eq!(Scene::load(None, &overrides).unwrap_err().exit_code(), 2);
     }
     let missing = Overrides { environment: Some("none.exr".into()), ..Overrides::default() };
