@@ -22,6 +22,8 @@ struct ProbeHit {
     float distance;
     float position[3];
     float normal[3];     // of the face, towards the outside
+    float shading[3];    // the same, interpolated where the object is smooth
+    uint instance;
 };
 
 layout(local_size_x = 64) in;
@@ -46,7 +48,9 @@ void main()
     for (int i = 0; i < 3; ++i) {
         hits[index].position[i] = arrival.position[i];
         hits[index].normal[i] = arrival.faceNormal[i];
+        hits[index].shading[i] = arrival.normal[i];
     }
+    hits[index].instance = found.instance;
 }
 
 #endif

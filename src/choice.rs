@@ -9,6 +9,8 @@
 //! is larger than the tolerance, they are not chosen.
 
 use std::f64::consts::SQRT_2;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use crate::cost::mean;
@@ -40,6 +42,10 @@ const RUNGS: [(Option<f64>, u32); 4] =
 /// The power of the number of samples that errors fall with at most. That of edges under evenly spread points is 0.75, and footprints
 /// shrink with 0.5; with 0.75 a hollow ball had 93.9 % of its pixels within a tolerance of 0.01 (`benches/estimates.rs`).
 const EDGES: f64 = 0.65;
+
+/// Beyond so many samples pilots tell nothing of how errors fall: with the square root of their number. With [`EDGES`] all the way a
+/// tinted ball had 91.8 % of its pixels within a tolerance of 0.001.
+const FAR: f64 = 4096.0;
 
 /// How much larger than the pilots say the error of samples may be: they are few pixels. `path` looks for itself, and is held to a
 /// little more than the tolerance says.
@@ -125,7 +131,9 @@ struct Law {
 
 impl Law {
     fn error(&self, samples: u32) -> f64 {
-        self.floor.hypot(self.spread * f64::from(samples).powf(-self.power))
+        let samples = f64::from(samples);
+        let (near, far) = (samples.min(FAR), samples.max(FAR) / FAR);
+        self.floor.hypot(self.spread * near.powf(-self.power) / far.sqrt())
     }
 
     /// How many samples it takes to err no more than that, if any number does; no fewer than were tried.
@@ -134,7 +142,13 @@ impl Law {
         if left.is_nan() || left <= 0.0 {
             return None;
         }
-        let samples = (self.margin * self.spread / left).powf(1.0 / self.power).ceil().max(f64::from(FEW));
+        let ratio = self.margin * self.spread / left;
+        let ratio_of_far = FAR.powf(self.power);
+        let samples = match ratio > ratio_of_far {
+            true => FAR * (ratio / ratio_of_far).powi(2),
+            false => ratio.powf(1.0 / self.power),
+        };
+        let samples = samples.ceil().max(f64::from(FEW));
         (samples <= f64::from(MOST_SAMPLES)).then_some(samples as u32)
     }
 }
@@ -148,16 +162,7 @@ pub fn choose(gpu: &Gpu, scene: &Scene, args: &RenderArgs) -> Result<Choice> {
     };
     let mut pilots = Pilots::new(gpu, scene, args, goal);
     if goal.seconds.is_none_or(|seconds| seconds >= SHORT) {
-        // Where `tree` needs no truth to be held against, it is the likelier choice.
-        if pilots.is_tree_exact() {
-            pilots.tree()?;
-            pilots.path()?;
-        } else {
-            pilots.path()?;
-            pilots.tree()?;
-        }
-        pilots.raster(Model::Double)?;
-        pilots.raster(Model::Single)?;
+        pilots.all()?;
     }
     let taken = start.elapsed();
     let (mut candidates, is_expected) = ranked(&pilots.laws, args, goal, taken);
@@ -174,6 +179,49 @@ pub fn choose(gpu: &Gpu, scene: &Scene, args: &RenderArgs) -> Result<Choice> {
     }
     let best = candidates.remove(0);
     Ok(Choice { goal, best, others: candidates, is_expected, unmeasured: None, taken })
+}
+
+/// What every model takes and how it errs, measured once: what is best for any goal follows.
+#[derive(Clone, Debug)]
+pub struct Measurements {
+    args: RenderArgs,
+    laws: Vec<(RenderArgs, Model, Law)>,
+}
+
+impl Measurements {
+    /// Of renders of `scene` with `args`, whose model counts for nothing and whose camera is framed already. It ends with
+    /// [`GpuError::Interrupted`](crate::gpu::GpuError::Interrupted) where `interrupt` is set.
+    pub fn new(gpu: &Gpu, scene: &Scene, args: &RenderArgs, interrupt: Arc<AtomicBool>) -> Result<Self> {
+        let args = RenderArgs { tolerance: None, time_budget: None, samples: None, model: None, ..args.clone() };
+        let mut pilots = Pilots::new(gpu, scene, &args, Goal { tolerance: None, seconds: None });
+        pilots.interrupt = Some(interrupt);
+        pilots.all()?;
+        let laws = pilots.laws;
+        Ok(Self { args, laws })
+    }
+
+    /// What each model has to offer for a goal, the best first. All have their samples given.
+    pub fn ranked(&self, goal: Goal) -> Vec<Candidate> {
+        let (mut all, _) = ranked(&self.laws, &self.args, goal, Duration::ZERO);
+        for one in &mut all {
+            one.args.samples = Some(one.samples);
+            one.args.tolerance = match one.model {
+                Model::Path => None,
+                _ => one.args.tolerance,
+            };
+        }
+        all
+    }
+
+    /// Milliseconds and errors of each model with 1, 2, 4, ... samples, as far as `most_ms`.
+    pub fn curves(&self, most_ms: f64) -> Vec<(Model, Vec<[f64; 2]>)> {
+        let curve = |(_, model, law): &(RenderArgs, Model, Law)| {
+            let samples = (0..20).map(|power| 1_u32 << power);
+            let points = samples.map(|samples| [law.ms * f64::from(samples), law.error(samples)]);
+            (*model, points.take_while(|&[ms, error]| ms <= most_ms && error > 0.0).collect())
+        };
+        self.laws.iter().map(curve).collect()
+    }
 }
 
 /// Why nothing was measured.
@@ -239,18 +287,39 @@ struct Pilots<'a> {
     laws: Vec<(RenderArgs, Model, Law)>,
     /// The mean of what `path` saw, if it sees all there is.
     truth: Option<Vec<[f32; 3]>>,
+    /// Set to end it.
+    interrupt: Option<Arc<AtomicBool>>,
 }
 
 impl<'a> Pilots<'a> {
     fn new(gpu: &'a Gpu, scene: &'a Scene, args: &'a RenderArgs, goal: Goal) -> Self {
         let size = args.size.unwrap_or(Plan::SIZE);
-        // Pixels of a picture as small are as wide, and err as much; of fewer, few tell little.
-        let most = if gpu.info().kind == DeviceKind::Cpu { PIXELS } else { PIXELS_OF_GPUS };
-        let scale = (size.pixels().clamp(FEWEST_PIXELS, most) / size.pixels()).sqrt();
-        let side = |side: u32| (f64::from(side) * scale).round().clamp(1.0, f64::from(gpu.max_image_side())) as u32;
-        let small = Size { width: side(size.width), height: side(size.height) };
+        let small = pilot_size(gpu, size);
         let pixels = size.pixels() / small.pixels();
-        Self { gpu, scene, args, goal, start: Instant::now(), size: small, pixels, laws: Vec::new(), truth: None }
+        let (start, laws, truth, interrupt) = (Instant::now(), Vec::new(), None, None);
+        Self { gpu, scene, args, goal, start, size: small, pixels, laws, truth, interrupt }
+    }
+
+    /// Of every model, as far as there is time.
+    fn all(&mut self) -> Result<()> {
+        // Where `tree` needs no truth to be held against, it is the likelier choice.
+        if self.is_tree_exact() {
+            self.tree()?;
+            self.path()?;
+        } else {
+            self.path()?;
+            self.tree()?;
+        }
+        self.raster(Model::Double)?;
+        self.raster(Model::Single)
+    }
+
+    fn renderer(&self, plan: &Plan) -> Result<Renderer> {
+        let mut renderer = Renderer::new(self.gpu, self.scene, plan)?;
+        if let Some(interrupt) = &self.interrupt {
+            renderer.interrupt_by(interrupt.clone());
+        }
+        Ok(renderer)
     }
 
     /// `args` for one model; `None` where it refuses them.
@@ -324,7 +393,7 @@ impl<'a> Pilots<'a> {
         if !plan.unseen.is_empty() {
             return Ok(());
         }
-        let mut renderer = Renderer::new(self.gpu, self.scene, &plan)?;
+        let mut renderer = self.renderer(&plan)?;
         let mut picture = |samples, seed| -> Result<(Rendered, Duration)> {
             let plan = self.plan(&args, samples, seed)?;
             renderer.set_limits(&plan)?;
@@ -345,7 +414,7 @@ impl<'a> Pilots<'a> {
         let ms = self.ms(&second, time);
         let truth = mean(&first.radiance, &second.radiance);
         // The difference of two has twice the variance of one.
-        let error = self.most(differences(&first.radiance, &second.radiance)) / SQRT_2;
+        let error = most(differences(&first.radiance, &second.radiance)) / SQRT_2;
         let spread = error * f64::from(samples).sqrt();
         if let Some(args) = taken {
             let law = Law { floor: 0.0, spread, power: 0.5, margin: MARGIN_OF_PATH, ms, lacks: 0 };
@@ -364,7 +433,7 @@ impl<'a> Pilots<'a> {
         let rungs: Vec<_> = RUNGS.iter().filter_map(rung).collect();
         let Some(args) = rungs.first() else { return Ok(()) };
         let plan = self.plan(args, FEW, 0)?;
-        let mut renderer = Renderer::new(self.gpu, self.scene, &plan)?;
+        let mut renderer = self.renderer(&plan)?;
         if plan.lacks() > 0 {
             return self.inexact(renderer, args.clone());
         }
@@ -378,7 +447,7 @@ impl<'a> Pilots<'a> {
             let host = start.elapsed();
             let (ms, finer) = (self.ms(&rendered, host), rendered.radiance);
             let Some((args, coarse, ms)) = before.replace((args, finer.clone(), ms)) else { continue };
-            let floor = self.most(errors(&coarse, &finer));
+            let floor = most(errors(&coarse, &finer));
             self.laws.push((args, Model::Tree, Law { floor, spread, power, margin: MARGIN, ms, lacks: 0 }));
             let is_enough = floor <= CUT_SHARE * self.goal.tolerance.unwrap_or(1e-3);
             if is_enough || host > LONG || !self.fits(Duration::ZERO) {
@@ -392,7 +461,7 @@ impl<'a> Pilots<'a> {
     fn raster(&mut self, model: Model) -> Result<()> {
         match self.options(model, None, None) {
             Some(args) if self.fits(Duration::ZERO) && self.truth.is_some() => {
-                let renderer = Renderer::new(self.gpu, self.scene, &self.plan(&args, MORE, 0)?)?;
+                let renderer = self.renderer(&self.plan(&args, MORE, 0)?)?;
                 self.inexact(renderer, args)
             }
             _ => Ok(()),
@@ -413,7 +482,7 @@ impl<'a> Pilots<'a> {
         // What is wrong in few pixels, as where a small object is missing, must not go unseen.
         let squares: f64 = errors(&rendered.radiance, &truth).map(|error| error * error).sum();
         let root = (squares / (3 * truth.len()) as f64).sqrt();
-        let floor = self.most(errors(&rendered.radiance, &truth)).max(root);
+        let floor = most(errors(&rendered.radiance, &truth)).max(root);
         let ms = if plan.model.traces() { ms } else { self.raster_ms(&args)? };
         let law = Law { floor, spread, power, margin: MARGIN, ms, lacks: plan.lacks() };
         self.laws.push((args, plan.model, law));
@@ -426,7 +495,7 @@ impl<'a> Pilots<'a> {
         let samples = Some(1);
         let whole = RenderArgs { samples, time_budget: None, tolerance: None, aov: None, ..args.clone() };
         let plan = Plan::new(self.scene, &whole)?;
-        let mut renderer = Renderer::new(self.gpu, self.scene, &plan)?;
+        let mut renderer = self.renderer(&plan)?;
         let start = Instant::now();
         let rendered = renderer.render(&plan, &mut |_| {})?;
         Ok(rendered.gpu_ms().unwrap_or(start.elapsed().as_secs_f64() * 1e3))
@@ -442,7 +511,7 @@ impl<'a> Pilots<'a> {
                 Ok(renderer.render(&plan, &mut |_| {})?.radiance)
             };
             let (first, second) = (picture(0x5eed_0003)?, picture(0x5eed_0004)?);
-            Ok(self.most(differences(&first, &second)) / SQRT_2)
+            Ok(most(differences(&first, &second)) / SQRT_2)
         };
         let start = Instant::now();
         let few = error_of(FEW)?;
@@ -454,14 +523,28 @@ impl<'a> Pilots<'a> {
         let power = ((few / more).ln() / f64::from(MORE / FEW).ln()).clamp(0.5, EDGES);
         Ok((more * f64::from(MORE).powf(power), power))
     }
+}
 
-    /// What all but the worst are within.
-    fn most(&self, errors: impl Iterator<Item = f64>) -> f64 {
-        let mut errors: Vec<_> = errors.collect();
-        errors.sort_by(f64::total_cmp);
-        let place = (errors.len() as f64 * MOST_PIXELS).ceil() as usize;
-        errors.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
-    }
+/// The size of small pictures that tell of one of `size`.
+pub fn pilot_size(gpu: &Gpu, size: Size) -> Size {
+    // Pixels of a picture as small are as wide, and err as much; of fewer, few tell little.
+    let most = if gpu.info().kind == DeviceKind::Cpu { PIXELS } else { PIXELS_OF_GPUS };
+    let scale = (size.pixels().clamp(FEWEST_PIXELS, most) / size.pixels()).sqrt();
+    let side = |side: u32| (f64::from(side) * scale).round().clamp(1.0, f64::from(gpu.max_image_side())) as u32;
+    Size { width: side(size.width), height: side(size.height) }
+}
+
+/// The error that all but the worst pixels of `picture` are within, where `truth` is right.
+pub fn error_of_most(picture: &[[f32; 3]], truth: &[[f32; 3]]) -> f64 {
+    most(errors(picture, truth))
+}
+
+/// What all but the worst are within.
+fn most(errors: impl Iterator<Item = f64>) -> f64 {
+    let mut errors: Vec<_> = errors.collect();
+    errors.sort_by(f64::total_cmp);
+    let place = (errors.len() as f64 * MOST_PIXELS).ceil() as usize;
+    errors.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
 /// No model takes the options that are given.

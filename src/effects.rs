@@ -345,6 +345,49 @@ impl Selection {
         selected.iter().filter(|effect| effect.row().needs.is_none_or(|needed| selected.contains(needed))).collect()
     }
 
+    /// Whether `effect` is selected or not whatever the scene calls for; `None`: that decides.
+    pub fn wish(&self, effect: Effect) -> Option<bool> {
+        let start = if matches!(self.terms.first(), Some(Term::Without(_))) { None } else { Some(false) };
+        self.terms.iter().fold(start, |wish, &term| match term {
+            Term::Auto => {
+                if wish == Some(true) {
+                    wish
+                } else {
+                    None
+                }
+            }
+            Term::All => Some(true),
+            Term::With(named) => {
+                if named == effect {
+                    Some(true)
+                } else {
+                    wish
+                }
+            }
+            Term::Without(named) => {
+                if named == effect {
+                    Some(false)
+                } else {
+                    wish
+                }
+            }
+        })
+    }
+
+    /// What the scene calls for, but for effects that are wished for or not.
+    pub fn of_wishes(wishes: impl IntoIterator<Item = (Effect, Option<bool>)>) -> Self {
+        let (mut terms, mut without) = (vec![Term::Auto], Vec::new());
+        for (effect, wish) in wishes {
+            match wish {
+                Some(true) => terms.push(Term::With(effect)),
+                Some(false) => without.push(Term::Without(effect)),
+                None => {}
+            }
+        }
+        terms.extend(without);
+        Self { terms }
+    }
+
     fn selected(&self, scene: &Scene) -> Effects {
         Effect::all()
             .filter(|&effect| {

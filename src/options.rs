@@ -399,6 +399,13 @@ impl RenderArgs {
 /// As on a command line: every option that is given.
 impl Display for RenderArgs {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.words().join(" "))
+    }
+}
+
+impl RenderArgs {
+    /// Every option that is given and shapes the picture, a word each.
+    pub fn words(&self) -> Vec<String> {
         let text = |value: Option<&dyn Display>| value.map(|value| value.to_string());
         let given = [
             ("model", self.model.map(|model| model.name().to_owned())),
@@ -424,7 +431,7 @@ impl Display for RenderArgs {
         ];
         let given = given.into_iter().filter_map(|(name, value)| value.map(|value| format!("--{name}={value}")));
         let settings = self.set.iter().flatten().map(|setting| format!("--set={setting}"));
-        f.write_str(&given.chain(settings).collect::<Vec<_>>().join(" "))
+        given.chain(settings).collect()
     }
 }
 

@@ -2,7 +2,7 @@
 //! pale yellow, lighter all the way.
 
 /// The colour of `value`, 0 to 1, as sRGB.
-pub(super) fn color(value: f32) -> [u8; 3] {
+pub(crate) fn color(value: f32) -> [u8; 3] {
     let [_, r, g, b] = MAGMA[usize::from((255.0 * value.clamp(0.0, 1.0)).round() as u8)].to_be_bytes();
     [r, g, b]
 }

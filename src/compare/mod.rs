@@ -2,7 +2,7 @@
 
 pub mod flip;
 mod limit;
-mod magma;
+pub(crate) mod magma;
 
 pub use flip::{Exposures, Flip};
 pub use limit::Limit;

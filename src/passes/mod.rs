@@ -224,6 +224,21 @@ impl Renderer {
         self.commands.set_patience(patience);
     }
 
+    /// What the model counted so far, if it does.
+    pub fn counts(&mut self, picture: &Refinement) -> crate::Result<Option<Counts>> {
+        let mean = self.commands.read_image(&picture.targets.mean)?;
+        Ok(picture.targets.counts(&mut self.commands, &mean, picture.samples)?)
+    }
+
+    /// An image of these sRGB values, row 0 at the top, ready to be sampled as that of [`display`](Self::display).
+    pub fn image_of(&mut self, Size { width, height }: Size, pixels: &[[u8; 4]]) -> crate::Result<Image> {
+        let uses = &[Use::CopyTarget, Use::Sampled];
+        let desc = ImageDesc { name: "pixels", width, height, format: Format::Rgba8, uses };
+        let image = self.commands.upload_image(&desc, pixels.as_flattened())?;
+        self.commands.run(|cmd| cmd.use_image(&image, Use::Sampled))?;
+        Ok(image)
+    }
+
     /// Mean radiance of each pixel, after a round at least.
     pub fn radiance(&mut self, picture: &Refinement) -> crate::Result<Vec<[f32; 3]>> {
         Ok(radiance(&self.commands.read_image(&picture.targets.mean)?)?)
@@ -316,6 +331,11 @@ impl Refinement {
     /// Samples per pixel so far.
     pub fn samples(&self) -> u32 {
         self.samples
+    }
+
+    /// Pixels.
+    pub fn size(&self) -> Size {
+        self.plan.size
     }
 
     /// Whether it has all that its plan asks for.

@@ -51,6 +51,10 @@ pub struct Hit {
     pub position: DVec3,
     /// Of the face, of unit length, towards the outside.
     pub normal: DVec3,
+    /// The same, interpolated where the object is smooth.
+    pub shading: DVec3,
+    /// Index into [`Scene::objects`].
+    pub index: usize,
 }
 
 /// What became of rays that cannot get out.
@@ -84,6 +88,8 @@ struct HitRecord {
     distance: f32,
     position: Vec3,
     normal: Vec3,
+    shading: Vec3,
+    instance: u32,
 }
 
 /// `Chain` of `shaders/probe_chain.glsl`.
@@ -105,6 +111,8 @@ pub struct TraceProbe {
     trace: Trace,
     resources: Resources,
     camera: DVec3,
+    /// What was compiled, by the shader's name and its constant.
+    pipelines: Vec<((&'static str, u32), ComputePipeline)>,
 }
 
 impl TraceProbe {
@@ -119,7 +127,8 @@ impl TraceProbe {
         super::check(gpu, &plan)?;
         let mut commands = Commands::new(gpu)?;
         let resources = Resources::new(&mut commands, scene, &plan, Some(trace), None)?;
-        Ok(Self { commands, trace, resources, camera: scene.camera.position })
+        let camera = scene.camera.position;
+        Ok(Self { commands, trace, resources, camera, pipelines: Vec::new() })
     }
 
     /// Where `point` lies in the device's space, where the camera is the origin and the farthest corner of the scene
@@ -155,15 +164,20 @@ impl TraceProbe {
         let [software, hardware] = shaders;
         let shader = if self.trace == Trace::Hardware { hardware } else { software };
         let push = SamplePush::default();
-        let bytes = size_of::<SamplePush>() as u32;
-        let constants = Specialization::default().with_number(CONSTANT, constant);
-        let pipeline = ComputePipeline::new(self.commands.gpu(), shader, group, bytes, &constants)?;
+        let key = (shader.name, constant);
+        if !self.pipelines.iter().any(|(known, _)| *known == key) {
+            let bytes = size_of::<SamplePush>() as u32;
+            let constants = Specialization::default().with_number(CONSTANT, constant);
+            let pipeline = ComputePipeline::new(self.commands.gpu(), shader, group, bytes, &constants)?;
+            self.pipelines.push((key, pipeline));
+        }
+        let Some((_, pipeline)) = self.pipelines.iter().find(|(known, _)| *known == key) else { return Ok(Vec::new()) };
         let groups = [(count as u32).div_ceil(GROUP), 1, 1];
         let mut times = Vec::new();
         for _ in 0..rounds {
             let passes = self.commands.run(|cmd| {
                 cmd.wait_for_buffers();
-                cmd.timed("probe", |cmd| cmd.dispatch(&pipeline, group, &push, groups));
+                cmd.timed("probe", |cmd| cmd.dispatch(pipeline, group, &push, groups));
             })?;
             times.extend(passes.iter().filter_map(|pass| pass.gpu_ms));
         }
@@ -195,6 +209,8 @@ impl TraceProbe {
                 distance: f64::from(record.distance) * metres,
                 position: record.position.as_dvec3() * metres + self.camera,
                 normal: record.normal.as_dvec3(),
+                shading: record.shading.as_dvec3().normalize_or(record.normal.as_dvec3()),
+                index: self.resources.objects[record.instance as usize],
             })
         };
         Ok(records.iter().take(rays.len()).map(hit).collect())

@@ -47,6 +47,8 @@ pub(super) struct Resources {
     pub(super) placed: Vec<Placed>,
     /// The instances, in their order.
     pub(super) draws: Vec<Draw>,
+    /// Of each its object in the scene.
+    pub(super) objects: Vec<usize>,
     pub(super) specialization: Specialization,
     /// From lengths on the device to metres.
     pub(super) metres_per_unit: f64,
@@ -360,6 +362,7 @@ impl Resources {
             layered,
             placed,
             draws: geometry.draws,
+            objects: geometry.objects,
             specialization: Specialization::effects(plan.effects)
                 .with(ENVIRONMENT_IMAGE, is_image)
                 .with(FOOTPRINTS, footprints)

@@ -32,7 +32,8 @@ impl Scene {
 
     fn set_one(&mut self, setting: &str) -> Result<()> {
         let document = Document { path: Path::new("--set"), text: setting };
-        const HINT: &str = "expected KEY=VALUE as in a scene file, such as camera.target=[0,1,0]; text stands in quotes";
+        const HINT: &str =
+            "expected KEY=VALUE as in a scene file, such as camera.target=[0,1,0]; text stands in quotes";
         let parsed = DeTable::parse(setting)
             .map_err(|error| document.error(0..0, format!("{}; {HINT}", error.message().replace('\n', ", "))))?;
         if parsed.get_ref().is_empty() {

@@ -1,15 +1,21 @@
 //! The desktop viewer: a window in which a scene is seen from all sides, and its glass changed.
 //!
-//! `App` takes events and draws; `worker` renders on a thread of its own; `panels` are the windows within the window. What is on the
-//! screen is what `vitrum render` makes of the same options, pixel for pixel.
+//! `App` takes events and draws; `worker` renders and `survey` measures, each on a thread of its own; `panels` are the windows within
+//! the window, and `state` is what they change. What is on the screen is what `vitrum render` makes of the same options, pixel for pixel.
 
+mod colors;
 mod desk;
+mod inspect;
 mod meter;
 mod orbit;
 mod panels;
+mod session;
+mod state;
+mod survey;
 mod worker;
 
 use std::path::PathBuf;
+use std::process::{Child, Command, Stdio};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
@@ -21,16 +27,23 @@ use winit::event_loop::{ActiveEventLoop, ControlFlow, EventLoop, EventLoopProxy}
 use winit::window::{Window, WindowId};
 
 use crate::gpu::{Gpu, GpuError, Instance, Messages, OnScreen, Screen, Surface};
-use crate::image::OutputFile;
-use crate::options::{RenderArgs, Size};
-use crate::scene::{Camera, Overrides, Scene};
+use crate::image::{ImageFormat, OutputFile};
+use crate::options::RenderArgs;
 use crate::{Error, Result};
 
-use meter::Meter;
-use worker::{News, Picture, Wanted, Worker};
+use session::{Action, Session};
+use state::{Edits, State};
+use survey::{Finding, Survey};
+use worker::{News, Worker};
 
 /// How long nothing has to change before the whole picture is made.
 const REST: Duration = Duration::from_millis(120);
+
+/// While pictures move, the window is drawn with each of them; without one it waits for so long.
+const GAP: Duration = Duration::from_millis(60);
+
+/// How often the viewer looks whether a file is written.
+const LOOK: Duration = Duration::from_millis(200);
 
 /// What a viewer is started with.
 pub struct Options {
@@ -45,94 +58,42 @@ pub fn run(options: Options) -> Result<Option<Arc<Messages>>> {
     let none = |error: winit::error::EventLoopError| GpuError::NoWindow(error.to_string());
     let event_loop = EventLoop::<()>::with_user_event().build().map_err(none)?;
     event_loop.set_control_flow(ControlFlow::Wait);
-    let state = State::new(options)?;
-    let mut app =
-        App { state, shown: None, proxy: event_loop.create_proxy(), closes: false, end: Ok(()), messages: None };
+    let session = Session::new(State::new(options)?);
+    let proxy = event_loop.create_proxy();
+    let mut app = App { session, shown: None, proxy, closes: false, end: Ok(()), messages: None };
     event_loop.run_app(&mut app).map_err(none)?;
-    let App { end, messages, shown, state, .. } = app;
+    let App { end, messages, shown, session, .. } = app;
     drop(shown);
     end?;
-    if let Some(file) = &state.args.stats {
-        let report = serde_json::to_string_pretty(&state.meter.report()).unwrap_or_default();
+    if let Some(file) = &session.state.args.stats {
+        let report = serde_json::to_string_pretty(&session.state.meter.report()).unwrap_or_default();
         OutputFile::new(file)?.write(report.as_bytes())?;
     }
     Ok(messages)
 }
 
-/// What is looked at, and how.
-struct State {
-    path: Option<PathBuf>,
-    scene: Scene,
-    args: RenderArgs,
-    /// Whether the size was given; else it is the window's.
-    sized: bool,
-    /// What went wrong last, until something else is asked for.
-    error: Option<String>,
-    picture: Option<Picture>,
-    /// Counts what is looked at: it grows with every change but those of the look.
-    revision: u64,
-    meter: Meter,
-}
-
-impl State {
-    fn new(Options { scene: path, args }: Options) -> Result<Self> {
-        let scene = Scene::load(path.as_deref(), &Overrides::of(&args))?;
-        let args = args.or(scene.render.clone());
-        let sized = args.size.is_some();
-        Ok(Self { path, sized, scene, args, error: None, picture: None, revision: 0, meter: Meter::default() })
-    }
-
-    /// Another scene in the place of this one; what cannot be read leaves it, and is said.
-    fn open(&mut self, path: PathBuf) -> bool {
-        let args = RenderArgs { ior: None, roughness: None, env: None, size: None, ..self.args.clone() };
-        let size = self.args.size.filter(|_| self.sized);
-        match Self::new(Options { scene: Some(path), args: RenderArgs { size, ..args } }) {
-            Ok(state) => {
-                let (picture, meter) = (self.picture.take(), std::mem::take(&mut self.meter));
-                *self = Self { picture, meter, revision: self.revision, ..state };
-            }
-            Err(error) => self.error = Some(error.in_full()),
-        }
-        self.error.is_none()
-    }
-
-    /// Another environment, if it can be read.
-    fn surround(&mut self, path: PathBuf) -> bool {
-        let overrides = Overrides { environment: Some(path.clone()), ..Overrides::default() };
-        match Scene::load(self.path.as_deref(), &overrides) {
-            Ok(scene) => {
-                self.scene.environment = scene.environment;
-                self.args.env = Some(path);
-                self.error = None;
-            }
-            Err(error) => self.error = Some(error.in_full()),
-        }
-        self.error.is_none()
-    }
-
-    fn size(&self) -> Size {
-        self.args.size.unwrap_or(Size { width: 1, height: 1 })
-    }
-}
-
 /// What there is while the window is open.
 struct Shown {
     worker: Worker,
+    survey: Survey,
     screen: Screen,
     egui: egui_winit::State,
-    texture: Option<egui::TextureId>,
+    textures: [Option<egui::TextureId>; 2],
     /// When something changed last, until the whole picture is asked for.
     changed: Option<Instant>,
     /// When it was that what was asked for last was asked for.
     asked: Instant,
     /// The first event that no frame has heard of yet.
     heard: Option<Instant>,
+    drawn: Instant,
     next: Option<Instant>,
+    /// A render of the picture into a file.
+    saving: Option<Child>,
     window: Arc<Window>,
 }
 
 struct App {
-    state: State,
+    session: Session,
     shown: Option<Shown>,
     proxy: EventLoopProxy<()>,
     /// Whether the user wants to leave.
@@ -144,37 +105,42 @@ struct App {
 
 impl App {
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Shown> {
-        let title = format!("{} - Vitrum", self.state.scene.name);
-        let attributes =
-            Window::default_attributes().with_title(title).with_inner_size(LogicalSize::new(1280.0, 720.0));
+        let state = &self.session.state;
+        let attributes = Window::default_attributes().with_inner_size(LogicalSize::new(1280.0, 720.0));
         let window = event_loop.create_window(attributes).map_err(|error| GpuError::NoWindow(error.to_string()))?;
         let window = Arc::new(window);
-        let validation = self.state.args.validation == Some(true);
+        let validation = state.args.validation == Some(true);
         let instance = Instance::for_windows(validation, &*window)?;
         self.messages = validation.then(|| instance.messages());
         let surface = Surface::new(&instance, &window)?;
-        let gpu = Gpu::open(&instance, instance.choose(self.state.args.device.as_deref())?)?;
+        let gpu = Gpu::open(&instance, instance.choose(state.args.device.as_deref())?)?;
         let screen = Screen::new(&gpu, surface)?;
         let context = egui::Context::default();
         let scale = Some(window.scale_factor() as f32);
         let side = Some(gpu.max_image_side() as usize);
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, scale, window.theme(), side);
-        let proxy = self.proxy.clone();
-        // A loop that has ended needs no news.
-        let worker = worker::start(gpu, move || {
-            let _ = proxy.send_event(());
-        });
+        let wake = || {
+            let proxy = self.proxy.clone();
+            // A loop that has ended needs no news.
+            move || {
+                let _ = proxy.send_event(());
+            }
+        };
+        let (worker, survey) = (worker::start(gpu.clone(), wake()), survey::start(gpu, wake()));
         window.request_redraw();
         let now = Instant::now();
         Ok(Shown {
             worker,
+            survey,
             screen,
             egui,
-            texture: None,
+            textures: [None, None],
             changed: Some(now),
             asked: now,
             heard: None,
+            drawn: now,
             next: None,
+            saving: None,
             window,
         })
     }
@@ -182,86 +148,169 @@ impl App {
     /// One frame: hears what there is, runs the panels, shows them.
     fn frame(&mut self) -> Result<()> {
         let Some(shown) = &mut self.shown else { return Ok(()) };
+        let session = &mut self.session;
         let start = Instant::now();
         let heard = shown.heard.take().unwrap_or(start);
-        let mut new = None;
-        for news in shown.worker.news() {
-            match news {
-                News::Picture(picture) => new = Some(picture),
-                News::Failed(error) => self.state.error = Some(error),
-                News::Lost => return Err(Error::Gpu(GpuError::Lost)),
-            }
-        }
-        let timed = new.as_ref().map(|picture| (picture.asked, picture.moving, picture.size != picture.whole));
-        if let Some(picture) = new {
-            shown.texture = Some(shown.screen.set_picture(picture.number, picture.image.clone())?);
-            self.state.picture = Some(picture);
-        }
+        let timed = shown.hear(session)?;
         let input = shown.egui.take_egui_input(&shown.window);
-        let dropped: Vec<_> = input.dropped_files.iter().map(|file| file.path().to_path_buf()).collect();
-        let (state, texture) = (&mut self.state, shown.texture);
-        let mut changes = false;
-        for path in dropped {
-            let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
-            changes |= match extension.as_deref() {
-                Some("exr" | "hdr" | "png" | "jpg" | "jpeg") => state.surround(path),
-                _ => state.open(path),
-            };
+        let mut edits = Edits::default();
+        for file in &input.dropped_files {
+            session.actions.push(Action::Open(file.path().to_path_buf()));
         }
         let context = shown.egui.egui_ctx().clone();
-        let mut edits = false;
-        let output = context.run_ui(input, |ui| edits |= panels::all(ui, state, texture));
-        if edits {
-            state.error = None;
-            changes = true;
+        let textures = shown.textures;
+        let output = context.run_ui(input, |ui| edits.add(panels::all(ui, session, textures)));
+        if edits.any() {
+            (session.state.error, session.state.notice) = (None, None);
         }
+        shown.act(session, &mut edits);
         shown.egui.handle_platform_output(&shown.window, output.platform_output);
         shown.screen.set_textures(output.textures_delta)?;
         self.closes = context.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Q));
-        let primitives = context.tessellate(output.shapes, output.pixels_per_point);
-        if shown.screen.draw(output.pixels_per_point, &primitives)? == OnScreen::Not {
-            let size = shown.window.inner_size();
-            if size.width > 0 && size.height > 0 {
-                shown.window.request_redraw();
+        shown.ask(session, edits, heard);
+        // What moves is drawn with its next picture.
+        let waits = edits.scene && timed.is_none() && start.duration_since(shown.drawn) < GAP;
+        if !waits {
+            shown.window.set_title(&format!("{} - Vitrum", session.state.scene.name));
+            let primitives = context.tessellate(output.shapes, output.pixels_per_point);
+            if shown.screen.draw(output.pixels_per_point, &primitives)? == OnScreen::Not {
+                let size = shown.window.inner_size();
+                if size.width > 0 && size.height > 0 {
+                    shown.window.request_redraw();
+                }
             }
+            shown.drawn = Instant::now();
+            session.state.meter.drew(shown.drawn.duration_since(start));
         }
-        let now = Instant::now();
-        state.meter.drew(now.duration_since(start));
         if let Some((asked, moving, stand_in)) = timed {
-            state.meter.showed(asked, moving, stand_in);
-        }
-        if changes {
-            (shown.changed, shown.asked) = (Some(now), heard);
-            state.revision += 1;
-            shown.worker.want(state.wanted(heard, /* moving: */ true));
-        } else if shown.changed.is_some_and(|changed| now.duration_since(changed) >= REST) {
-            shown.changed = None;
-            shown.worker.want(state.wanted(shown.asked, /* moving: */ false));
+            session.state.meter.showed(asked, moving, stand_in);
         }
         let delay = output.viewport_output.values().map(|viewport| viewport.repaint_delay).min();
-        let repaint = delay.and_then(|delay| now.checked_add(delay));
-        shown.next = [repaint, shown.changed.map(|changed| changed + REST)].into_iter().flatten().min();
+        let repaint = delay.and_then(|delay| Instant::now().checked_add(delay));
+        let gap = waits.then(|| shown.drawn + GAP);
+        let saved = shown.saving.is_some().then(|| Instant::now() + LOOK);
+        shown.next = [repaint, gap, saved, shown.changed.map(|changed| changed + REST)].into_iter().flatten().min();
         Ok(())
     }
 }
 
-impl State {
-    fn wanted(&self, asked: Instant, moving: bool) -> Wanted {
-        let mut scene = self.scene.clone();
-        let size = self.size();
-        scene.frame(f64::from(size.width) / f64::from(size.height));
-        Wanted { revision: self.revision, scene, shots: vec![self.args.clone()], moving, asked }
+impl Shown {
+    /// Takes in what the threads have to say; of the last picture when it was asked for, whether things moved, and whether it stands in.
+    fn hear(&mut self, session: &mut Session) -> Result<Option<(Instant, bool, bool)>> {
+        let state = &mut session.state;
+        let mut timed = None;
+        for news in self.worker.news() {
+            match news {
+                News::Picture(picture) => {
+                    let number = picture.number;
+                    self.textures[number] = Some(self.screen.set_picture(number, picture.image.clone())?);
+                    if number == 0 {
+                        timed = Some((picture.asked, picture.moving, picture.size != picture.whole));
+                        if picture.size == picture.whole {
+                            session.cost.keep(&picture);
+                        }
+                    }
+                    state.pictures[number] = Some(picture);
+                }
+                News::Failed(error) => state.error = Some(error),
+                News::Lost => return Err(Error::Gpu(GpuError::Lost)),
+            }
+        }
+        for finding in self.survey.news() {
+            match finding {
+                Finding::Error(revision, measured) => session.cost.error = Some((revision, measured)),
+                Finding::NoError(revision, why) => session.cost.no_error = Some((revision, why)),
+                Finding::Offers(revision, offers) => session.cost.offers = Some((revision, offers)),
+                Finding::Pixel(inspection) => session.pixel.inspection = Some((state.revision, inspection)),
+                Finding::Failed(error) => state.error = Some(error),
+                Finding::Lost => return Err(Error::Gpu(GpuError::Lost)),
+            }
+        }
+        if let Some(child) = &mut self.saving
+            && let Ok(Some(_)) = child.try_wait()
+            && let Some(child) = self.saving.take()
+        {
+            let output = child.wait_with_output();
+            let said = output.as_ref().map(|output| String::from_utf8_lossy(&output.stderr).trim().to_owned());
+            match (output.as_ref().is_ok_and(|output| output.status.success()), said) {
+                (true, _) => state.notice = Some(format!("saved {}", state.output)),
+                (false, Ok(said)) => state.error = Some(said),
+                (false, Err(error)) => state.error = Some(format!("cannot save: {error}")),
+            }
+        }
+        Ok(timed)
     }
 
-    fn drag(&mut self, by: impl FnOnce(Camera) -> Camera) {
-        let size = self.size();
-        self.scene.frame(f64::from(size.width) / f64::from(size.height));
-        self.scene.framed = false;
-        let camera = by(self.scene.camera);
-        if Camera::new(camera.position, camera.target, camera.up, camera.vertical_fov).is_ok() {
-            self.scene.camera = camera;
+    /// Does what the panels asked for.
+    fn act(&mut self, session: &mut Session, edits: &mut Edits) {
+        for action in std::mem::take(&mut session.actions) {
+            let state = &mut session.state;
+            match action {
+                Action::Open(path) => {
+                    let extension = path.extension().map(|extension| extension.to_string_lossy().to_lowercase());
+                    let opened = match extension.as_deref() {
+                        Some("exr" | "hdr" | "png" | "jpg" | "jpeg") => state.surround(path),
+                        _ => {
+                            let opened = state.open(path.clone());
+                            if opened {
+                                state.remember(&path);
+                            }
+                            opened
+                        }
+                    };
+                    edits.scene |= opened;
+                }
+                Action::Reload => edits.scene |= state.reload(),
+                Action::Copy => {
+                    self.egui.egui_ctx().copy_text(state.command());
+                    state.notice = Some("the command is on the clipboard".into());
+                }
+                Action::Save => match save(state) {
+                    Ok(child) => {
+                        self.saving = Some(child);
+                        state.notice = Some(format!("rendering {} ...", state.output));
+                    }
+                    Err(error) => state.error = Some(error.in_full()),
+                },
+            }
         }
     }
+
+    /// Asks the threads for what is to be seen and known.
+    fn ask(&mut self, session: &mut Session, edits: Edits, heard: Instant) {
+        let pixel = session.pixel.pixel.filter(|_| session.pixel.is_open);
+        let now = Instant::now();
+        if edits.scene {
+            (self.changed, self.asked) = (Some(now), heard);
+            session.state.revision += 1;
+            session.forget();
+            let wanted = session.state.wanted(heard, /* moving: */ true);
+            self.worker.want(wanted);
+            return;
+        }
+        let rests = self.changed.is_some_and(|changed| now.duration_since(changed) >= REST);
+        if rests || edits.look {
+            let asked = if rests { self.asked } else { heard };
+            let wanted = session.state.wanted(asked, /* moving: */ false);
+            self.worker.want(worker::Wanted { pixel, ..wanted });
+            self.changed = self.changed.filter(|_| !rests);
+        }
+        if self.changed.is_none()
+            && let Some(query) = session.query()
+        {
+            self.survey.want(query);
+        }
+    }
+}
+
+/// Starts the render that the command names, which leaves the picture in its file.
+fn save(state: &State) -> Result<Child> {
+    ImageFormat::of(state.output.as_ref())?;
+    let program = std::env::current_exe().map_err(|error| Error::file("vitrum", "find", error))?;
+    let mut command = Command::new(&program);
+    command.arg("render").args(state.options()).arg("-q").arg("-o").arg(&state.output);
+    command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
+    command.spawn().map_err(|error| Error::file(program, "start", error))
 }
 
 impl ApplicationHandler for App {

@@ -8,7 +8,9 @@ use std::collections::HashMap;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use super::colors::{Legend, colors};
 use super::desk::{Hand, Orders};
+use super::state::Shows;
 use crate::gpu::{Gpu, GpuError, Image, PassTime};
 use crate::options::{RenderArgs, Size};
 use crate::passes::{Refinement, Renderer, Step};
@@ -35,13 +37,22 @@ const PERIOD: Duration = Duration::from_millis(150);
 /// How long a submission should take: whoever moves something waits for its end.
 const PATIENCE: Duration = Duration::from_millis(25);
 
+/// A picture to be made.
+pub(super) struct Shot {
+    pub(super) scene: Scene,
+    /// Model, size, samples and the rest.
+    pub(super) args: RenderArgs,
+    /// What of it is shown.
+    pub(super) shows: Shows,
+}
+
 /// Pictures to be made.
 pub(super) struct Wanted {
-    /// Tells these from others, but for exposures and tone curves.
+    /// Tells these from others, but for how they are shown.
     pub(super) revision: u64,
-    pub(super) scene: Scene,
-    /// Of each picture model, size, samples and the rest.
-    pub(super) shots: Vec<RenderArgs>,
+    pub(super) shots: Vec<Shot>,
+    /// A pixel of the first whose value is to be known.
+    pub(super) pixel: Option<[u32; 2]>,
     /// Whether more follows at once: stand-ins are enough.
     pub(super) moving: bool,
     /// When it was asked for.
@@ -63,6 +74,10 @@ pub(super) struct Picture {
     pub(super) passes: Vec<PassTime>,
     /// What the model does not simulate, or by something simpler.
     pub(super) lacks: Vec<String>,
+    /// What its colours stand for, where they are not those of light.
+    pub(super) legend: Option<Legend>,
+    /// Radiance of the pixel that was asked for.
+    pub(super) value: Option<[f32; 3]>,
     pub(super) moving: bool,
     /// When it was asked for.
     pub(super) asked: Instant,
@@ -111,6 +126,31 @@ impl Speed {
             (None, None) => wanted / SLOW,
         }
     }
+}
+
+/// What is to be seen of a picture.
+struct Seen {
+    image: Image,
+    /// What its colours mean, where they are not those of light.
+    legend: Option<Legend>,
+    /// Radiance of the pixel that was asked for.
+    value: Option<[f32; 3]>,
+}
+
+fn shown(renderer: &mut Renderer, picture: &mut Refinement, shot: &Shot, pixel: Option<[u32; 2]>) -> Result<Seen> {
+    let value = match pixel {
+        Some([x, y]) => renderer.radiance(picture)?.get((y * picture.size().width + x) as usize).copied(),
+        None => None,
+    };
+    let RenderArgs { exposure, tonemap, .. } = shot.args;
+    picture.set_look(exposure.unwrap_or(0.0), tonemap.unwrap_or_default());
+    if shot.shows != Shows::Light
+        && let Some(counts) = renderer.counts(picture)?
+        && let Some((pixels, legend)) = colors(shot.shows, &counts, &renderer.radiance(picture)?)
+    {
+        return Ok(Seen { image: renderer.image_of(picture.size(), &pixels)?, legend: Some(legend), value });
+    }
+    Ok(Seen { image: renderer.display(picture)?, legend: None, value })
 }
 
 /// One of the pictures.
@@ -177,7 +217,7 @@ impl Work {
 
     /// How coarse a stand-in has to be to take no longer than one may.
     fn coarse(&self, wanted: &Wanted, number: usize) -> Result<f64> {
-        let whole = Plan::new(&wanted.scene, &wanted.shots[number])?;
+        let whole = Plan::new(&wanted.shots[number].scene, &wanted.shots[number].args)?;
         let speed = self.speed.get(whole.model.name()).copied().unwrap_or_default();
         let pixels = speed.pixels(STAND_IN.as_secs_f64() * 1e3 / wanted.shots.len() as f64);
         let least = (whole.size.pixels() / pixels).sqrt();
@@ -186,13 +226,13 @@ impl Work {
 
     /// One sample of a coarser picture. `leaves`: whether it is left where something else is wanted.
     fn stand_in(&mut self, wanted: &Wanted, number: usize, coarse: f64, leaves: bool) -> Result<()> {
-        let args = &wanted.shots[number];
-        let whole = Plan::new(&wanted.scene, args)?.size;
+        let Shot { scene, args, .. } = &wanted.shots[number];
+        let whole = Plan::new(scene, args)?.size;
         let side = |side: u32| (f64::from(side) / coarse).ceil() as u32;
         let size = Size { width: side(whole.width), height: side(whole.height) };
         let (tolerance, time_budget) = (None, None);
         let args = RenderArgs { size: Some(size), samples: Some(1), tolerance, time_budget, ..args.clone() };
-        let plan = Plan::new(&wanted.scene, &args)?;
+        let plan = Plan::new(scene, &args)?;
         self.renderer(wanted, number, &plan)?;
         let orders = &self.orders;
         let Some(renderer) = &mut self.slots[number].renderer else { return Ok(()) };
@@ -201,11 +241,11 @@ impl Work {
         if renderer.advance(&mut picture, &mut || !(leaves && orders.is_late()))? == Step::Paused {
             return Ok(());
         }
-        let image = renderer.display(&mut picture)?;
+        let seen = shown(renderer, &mut picture, &wanted.shots[number], None)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
         self.slots[number].stood_in = Some(wanted.revision);
         self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
-        self.show(wanted, number, &plan, whole, &picture, image);
+        self.show(wanted, number, &plan, whole, &picture, seen);
         Ok(())
     }
 
@@ -215,7 +255,7 @@ impl Work {
         let (plan, mut picture) = match kept {
             Some((_, plan, picture)) => (plan, picture),
             None => {
-                let plan = Plan::new(&wanted.scene, &wanted.shots[number])?;
+                let plan = Plan::new(&wanted.shots[number].scene, &wanted.shots[number].args)?;
                 let picture = self.renderer(wanted, number, &plan)?.begin(&plan)?;
                 (plan, picture)
             }
@@ -240,11 +280,10 @@ impl Work {
             left |= self.orders.is_late();
             let is_due = shown.is_none_or(|shown| shown.elapsed() > PERIOD);
             if picture.samples() > 0 && step != Step::Paused && (is_due || picture.is_whole()) {
-                let RenderArgs { exposure, tonemap, .. } = wanted.shots[number];
-                picture.set_look(exposure.unwrap_or(0.0), tonemap.unwrap_or_default());
-                let image = renderer.display(&mut picture)?;
+                let asked = wanted.pixel.filter(|[x, y]| number == 0 && *x < plan.size.width && *y < plan.size.height);
+                let seen = self::shown(renderer, &mut picture, &wanted.shots[number], asked)?;
                 shown = Some(Instant::now());
-                self.show(wanted, number, &plan, plan.size, &picture, image);
+                self.show(wanted, number, &plan, plan.size, &picture, seen);
             }
             if left || picture.is_whole() {
                 self.slots[number].whole = Some((wanted.revision, plan, picture));
@@ -258,18 +297,26 @@ impl Work {
         let slot = &mut self.slots[number];
         match &mut slot.renderer {
             Some(renderer) => {
-                renderer.change(&wanted.scene, plan)?;
+                renderer.change(&wanted.shots[number].scene, plan)?;
                 Ok(renderer)
             }
             none => {
-                let mut renderer = Renderer::new(&self.gpu, &wanted.scene, plan)?;
+                let mut renderer = Renderer::new(&self.gpu, &wanted.shots[number].scene, plan)?;
                 renderer.set_patience(PATIENCE);
                 Ok(none.insert(renderer))
             }
         }
     }
 
-    fn show(&self, wanted: &Wanted, number: usize, plan: &Plan, whole: Size, picture: &Refinement, image: Image) {
+    fn show(
+        &self,
+        wanted: &Wanted,
+        number: usize,
+        plan: &Plan,
+        whole: Size,
+        picture: &Refinement,
+        Seen { image, legend, value }: Seen,
+    ) {
         let lacks = [(&plan.unsupported, "does not simulate"), (&plan.approximate, "approximates")];
         let lacks = lacks.into_iter().filter(|(effects, _)| **effects != Default::default());
         self.orders.tell(News::Picture(Picture {
@@ -284,6 +331,8 @@ impl Work {
             },
             passes: picture.passes().to_vec(),
             lacks: lacks.map(|(effects, what)| format!("{what} {}", effects.names().join(", "))).collect(),
+            legend,
+            value,
             moving: wanted.moving,
             asked: wanted.asked,
         }));

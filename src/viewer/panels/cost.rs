@@ -1,0 +1,142 @@
+//! What the picture costs and how far off it is, what else there is, and what chooses by that.
+
+use egui::{Color32, Slider, Ui};
+use egui_plot::{Legend, Line, MarkerShape, Plot, PlotPoints, Points};
+
+use super::super::session::{Session, Target};
+use super::super::state::Edits;
+use crate::choice::Goal;
+use crate::options::{Model, RenderArgs};
+
+/// How long curves are drawn.
+const MOST_MS: f64 = 3.6e6;
+
+fn color(model: Model) -> Color32 {
+    match model {
+        Model::Single => Color32::from_rgb(240, 160, 60),
+        Model::Double => Color32::from_rgb(120, 200, 90),
+        Model::Tree => Color32::from_rgb(90, 170, 240),
+        Model::Path => Color32::from_rgb(220, 110, 190),
+    }
+}
+
+pub(super) fn cost(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
+    times(ui, session);
+    ui.separator();
+    error(ui, session);
+    ui.separator();
+    targets(ui, session, edits);
+    offers(ui, session, edits);
+}
+
+/// Milliseconds a sample, now and before.
+fn times(ui: &mut Ui, session: &Session) {
+    let history = &session.cost.history;
+    let Some(last) = history.back() else { return };
+    let all: f64 = last.iter().map(|(_, ms)| ms).sum();
+    ui.label(format!("{all:.1} ms a sample on the device"));
+    for (name, ms) in last {
+        ui.small(format!("{name} {ms:.1} ms"));
+    }
+    let sums = history.iter().enumerate().map(|(i, passes)| [i as f64, passes.iter().map(|(_, ms)| ms).sum()]);
+    let line = Line::new("ms", PlotPoints::from_iter(sums)).color(Color32::LIGHT_BLUE);
+    let plot = Plot::new("times").height(60.0).show_x(false).allow_drag(false).allow_zoom(false).allow_scroll(false);
+    plot.show_axes([false, true]).include_y(0.0).show(ui, |plot| plot.line(line));
+}
+
+/// How far off the picture is.
+fn error(ui: &mut Ui, session: &Session) {
+    let revision = session.state.revision;
+    let cost = &session.cost;
+    if let Some((_, why)) = cost.no_error.as_ref().filter(|(of, _)| *of == revision) {
+        ui.label(why);
+        return;
+    }
+    match cost.error.filter(|(of, _)| *of == revision) {
+        Some((_, measured)) => {
+            ui.label(format!("95 % of the pixels are within {:.1e}", measured.error));
+            let (model, samples) = (measured.model.name(), measured.samples);
+            let noise =
+                if measured.noise > 0.0 { format!(", itself within {:.1e}", measured.noise) } else { String::new() };
+            ui.small(format!("of {model} with {samples} samples{noise}"));
+        }
+        None => {
+            ui.label("measuring how far off this is ...");
+        }
+    }
+}
+
+/// A tolerance or a frame rate that chooses the model.
+fn targets(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
+    let cost = &mut session.cost;
+    let before = (cost.target, cost.tolerance, cost.rate);
+    ui.horizontal(|ui| {
+        ui.label("Choose by");
+        ui.selectable_value(&mut cost.target, Target::None, "hand");
+        ui.selectable_value(&mut cost.target, Target::Tolerance, "error");
+        ui.selectable_value(&mut cost.target, Target::FrameRate, "rate");
+    });
+    ui.spacing_mut().slider_width = 120.0;
+    match cost.target {
+        Target::None => {}
+        Target::Tolerance => {
+            ui.add(Slider::new(&mut cost.tolerance, 1e-3..=0.5).logarithmic(true).max_decimals(3).text("error"));
+        }
+        Target::FrameRate => {
+            ui.add(Slider::new(&mut cost.rate, 0.1..=120.0).logarithmic(true).max_decimals(1).text("a second"));
+        }
+    }
+    let goal = match cost.target {
+        Target::None => return,
+        Target::Tolerance => Goal { tolerance: Some(cost.tolerance), seconds: None },
+        Target::FrameRate => Goal { tolerance: None, seconds: Some(1.0 / cost.rate) },
+    };
+    let Some((_, offers)) = &cost.offers else { return };
+    let changed = before != (cost.target, cost.tolerance, cost.rate);
+    let Some(best) = offers.ranked(goal).into_iter().next() else {
+        ui.small("nothing tells how far off a model is");
+        return;
+    };
+    let RenderArgs { model, samples, max_depth, tolerance, .. } = best.args;
+    ui.small(format!("{}, {} samples: {:.0} ms, within {:.1e}", best.model.name(), best.samples, best.ms, best.error));
+    let args = &mut session.state.args;
+    let now = (args.model, args.samples, args.max_depth, args.tolerance);
+    if changed && now != (model, samples, max_depth, tolerance) {
+        (args.model, args.samples, args.max_depth, args.tolerance) = (model, samples, max_depth, tolerance);
+        edits.scene = true;
+    }
+}
+
+/// Error against time, of all models.
+fn offers(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
+    let revision = session.state.revision;
+    let Some((of, offers)) = &session.cost.offers else {
+        ui.small("measuring what the models have to offer ...");
+        return;
+    };
+    if *of != revision {
+        ui.small("as it was before the last change");
+    }
+    let log = |[ms, error]: [f64; 2]| [ms.max(1e-3).log10(), error.max(1e-9).log10()];
+    let decade = |mark: egui_plot::GridMark, _: &_| format!("1e{:.0}", mark.value);
+    let plot = Plot::new("offers").height(170.0).x_axis_label("ms").y_axis_label("error").legend(Legend::default());
+    let plot = plot.x_axis_formatter(decade).y_axis_formatter(decade).show_x(false).show_y(false);
+    let plot = plot.allow_scroll(false).allow_drag(false).allow_zoom(false);
+    let here = session.cost.error.filter(|(of, _)| *of == revision).map(|(_, measured)| measured.error);
+    let picture = session.state.pictures[0].as_ref();
+    let ms = picture.filter(|picture| picture.size == picture.whole).and_then(|picture| {
+        let one: Option<f64> = picture.passes.iter().map(|pass| pass.gpu_ms).sum();
+        Some(one? / f64::from(picture.samples) * f64::from(picture.of.unwrap_or(picture.samples)))
+    });
+    plot.show(ui, |plot| {
+        for (model, curve) in offers.curves(MOST_MS) {
+            let points = curve.into_iter().map(log);
+            plot.line(Line::new(model.name(), PlotPoints::from_iter(points)).color(color(model)));
+        }
+        if let (Some(error), Some(ms)) = (here, ms) {
+            let here = Points::new("here", PlotPoints::from_iter([log([ms, error])]));
+            plot.points(here.shape(MarkerShape::Asterisk).radius(7.0).color(Color32::WHITE));
+        }
+    });
+    let _ = edits;
+}

@@ -1,0 +1,38 @@
+//! Files: the scene, the picture, and the command that repeats it.
+
+use egui::{TextEdit, Ui};
+
+use super::super::session::{Action, Session};
+
+pub(super) fn file(ui: &mut Ui, session: &mut Session) {
+    let state = &mut session.state;
+    ui.horizontal(|ui| {
+        ui.label("Scene");
+        ui.add(egui::Label::new(&state.scene.name).truncate()).on_hover_text(&state.scene.name);
+    });
+    ui.small("drop a scene, a mesh or an environment on the window to open it");
+    ui.horizontal(|ui| {
+        if ui.button("Reload").clicked() {
+            session.actions.push(Action::Reload);
+        }
+        if ui.button("Copy command").on_hover_text(state.command()).clicked() {
+            session.actions.push(Action::Copy);
+        }
+    });
+    ui.horizontal(|ui| {
+        if ui.button("Save").on_hover_text("renders the picture with all of its samples").clicked() {
+            session.actions.push(Action::Save);
+        }
+        ui.add(TextEdit::singleline(&mut state.output).desired_width(150.0).hint_text("picture.png or .exr"));
+    });
+    if !state.recent.is_empty() {
+        ui.collapsing("Recent", |ui| {
+            for path in &state.recent {
+                let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
+                if ui.link(name).on_hover_text(path.display().to_string()).clicked() {
+                    session.actions.push(Action::Open(path.clone()));
+                }
+            }
+        });
+    }
+}

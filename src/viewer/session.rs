@@ -1,0 +1,123 @@
+//! What the panels share beside the state: what was measured, and what they ask for.
+
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use super::inspect::Inspection;
+use super::state::State;
+use super::survey::{Measured, Query};
+use super::worker::Picture;
+use crate::choice::Measurements;
+
+/// Pictures whose times are plotted.
+const HISTORY: usize = 120;
+
+/// Something that a panel cannot do itself.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Action {
+    Open(PathBuf),
+    Reload,
+    /// Renders the picture into [`State::output`].
+    Save,
+    /// Puts the command that repeats the picture on the clipboard.
+    Copy,
+}
+
+/// What is asked of the model's choice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Target {
+    /// The user chooses.
+    #[default]
+    None,
+    Tolerance,
+    FrameRate,
+}
+
+/// The Cost window.
+pub(super) struct Cost {
+    pub(super) is_open: bool,
+    /// Milliseconds of a sample of each pass, of the last pictures.
+    pub(super) history: VecDeque<Vec<(&'static str, f64)>>,
+    pub(super) error: Option<(u64, Measured)>,
+    pub(super) no_error: Option<(u64, String)>,
+    pub(super) offers: Option<(u64, Arc<Measurements>)>,
+    pub(super) target: Target,
+    pub(super) tolerance: f64,
+    /// Pictures a second.
+    pub(super) rate: f64,
+}
+
+impl Default for Cost {
+    fn default() -> Self {
+        Self {
+            is_open: false,
+            history: VecDeque::new(),
+            error: None,
+            no_error: None,
+            offers: None,
+            target: Target::None,
+            tolerance: crate::choice::TOLERANCE,
+            rate: 20.0,
+        }
+    }
+}
+
+impl Cost {
+    pub(super) fn keep(&mut self, picture: &Picture) {
+        let samples = f64::from(picture.samples);
+        let times = picture.passes.iter().filter_map(|pass| pass.gpu_ms.map(|ms| (pass.name, ms / samples)));
+        if self.history.len() == HISTORY {
+            self.history.pop_front();
+        }
+        self.history.push_back(times.collect());
+    }
+}
+
+/// The Pixel window.
+#[derive(Default)]
+pub(super) struct Pixel {
+    pub(super) is_open: bool,
+    pub(super) pixel: Option<[u32; 2]>,
+    pub(super) inspection: Option<(u64, Box<Inspection>)>,
+}
+
+/// All that is open.
+pub(super) struct Session {
+    pub(super) state: State,
+    pub(super) cost: Cost,
+    pub(super) pixel: Pixel,
+    pub(super) actions: Vec<Action>,
+    /// What the survey was asked last.
+    asked: Option<(u64, bool, bool, Option<[u32; 2]>)>,
+}
+
+impl Session {
+    pub(super) fn new(state: State) -> Self {
+        let (cost, pixel) = (Cost::default(), Pixel::default());
+        Self { state, cost, pixel, actions: Vec::new(), asked: None }
+    }
+
+    /// What is to be measured of what is at rest, if that is not under way already.
+    pub(super) fn query(&mut self) -> Option<Query> {
+        let pixel = self.pixel.pixel.filter(|_| self.pixel.is_open);
+        let known = self.pixel.inspection.as_ref();
+        let is_known = known.is_some_and(|(revision, of)| *revision == self.state.revision && Some(of.pixel) == pixel);
+        let pixel = pixel.filter(|_| !is_known);
+        let offers = self.cost.is_open;
+        let wish = (self.state.revision, self.cost.is_open, offers, pixel);
+        let has_wishes = self.cost.is_open || pixel.is_some();
+        if self.asked == Some(wish) || !has_wishes {
+            return None;
+        }
+        self.asked = Some(wish);
+        let shot = self.state.wanted(std::time::Instant::now(), false).shots.swap_remove(0);
+        let (scene, args) = (shot.scene, shot.args);
+        Some(Query { revision: self.state.revision, scene, args, error: self.cost.is_open, offers, pixel })
+    }
+
+    /// Whatever was measured is of something else from now on.
+    pub(super) fn forget(&mut self) {
+        self.asked = None;
+    }
+}

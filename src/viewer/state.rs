@@ -1,0 +1,344 @@
+//! What the viewer looks at, and how. In flow files and edits, out flow pictures to be wanted and the command that repeats one.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use super::Options;
+use super::meter::Meter;
+use super::worker::{Picture, Shot, Wanted};
+use crate::effects::{Caller, Effect, Selection};
+use crate::options::{Model, ModelChoice, RenderArgs, Size};
+use crate::scene::{Camera, Overrides, Scene};
+use crate::{Error, Result};
+
+/// What was changed.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) struct Edits {
+    /// What is rendered.
+    pub(super) scene: bool,
+    /// How it is shown: exposure, tone curve, colours that stand for numbers.
+    pub(super) look: bool,
+}
+
+impl Edits {
+    pub(super) fn any(self) -> bool {
+        self.scene || self.look
+    }
+
+    pub(super) fn add(&mut self, other: Self) {
+        self.scene |= other.scene;
+        self.look |= other.look;
+    }
+}
+
+/// What is shown of a picture.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum Shows {
+    /// Light, as a screen shows it.
+    #[default]
+    Light,
+    /// Interfaces that scattered it.
+    Interfaces,
+    /// What `tree` cut off.
+    Discarded,
+    /// The standard error of `path` and `double`.
+    Error,
+}
+
+impl Shows {
+    pub(super) const ALL: [Self; 4] = [Self::Light, Self::Interfaces, Self::Discarded, Self::Error];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Light => "light",
+            Self::Interfaces => "interfaces",
+            Self::Discarded => "discarded",
+            Self::Error => "error",
+        }
+    }
+
+    /// Whether `model` has it.
+    pub(super) fn is_of(self, model: Model) -> bool {
+        match self {
+            Self::Light => true,
+            Self::Interfaces => model != Model::Single,
+            Self::Discarded => model == Model::Tree,
+            Self::Error => matches!(model, Model::Path | Model::Double),
+        }
+    }
+}
+
+/// What the picture is held against, on the other side of the wipe.
+pub(super) struct Beside {
+    /// Materials and surroundings as they were; `None`: those of the picture.
+    pub(super) scene: Option<Scene>,
+    pub(super) args: RenderArgs,
+    pub(super) name: String,
+}
+
+/// All of it.
+pub(super) struct State {
+    pub(super) path: Option<PathBuf>,
+    pub(super) scene: Scene,
+    /// As it was read.
+    before: Scene,
+    pub(super) args: RenderArgs,
+    /// Whether the size was given; else it is the window's.
+    pub(super) sized: bool,
+    /// What went wrong last, until something else is asked for.
+    pub(super) error: Option<String>,
+    /// What went well last, until something else is asked for.
+    pub(super) notice: Option<String>,
+    /// The picture, and what is beside it.
+    pub(super) pictures: [Option<Picture>; 2],
+    pub(super) beside: Option<Beside>,
+    /// Where the wipe is, from 0 at the left to 1.
+    pub(super) wipe: f32,
+    pub(super) shows: Shows,
+    /// Counts what is looked at: it grows with every change but those of the look.
+    pub(super) revision: u64,
+    pub(super) meter: Meter,
+    /// Where a picture is saved to.
+    pub(super) output: String,
+    pub(super) recent: Vec<PathBuf>,
+}
+
+impl State {
+    pub(super) fn new(Options { scene: path, args }: Options) -> Result<Self> {
+        let scene = Scene::load(path.as_deref(), &Overrides::of(&args))?;
+        let args = args.or(scene.render.clone());
+        if args.model == Some(ModelChoice::Auto) {
+            let advice = "the viewer needs a model by name; its Cost window chooses one";
+            return Err(Error::Usage(format!("--model auto: {advice}")));
+        }
+        Ok(Self {
+            path,
+            before: scene.clone(),
+            scene,
+            sized: args.size.is_some(),
+            args,
+            error: None,
+            notice: None,
+            pictures: [None, None],
+            beside: None,
+            wipe: 0.5,
+            shows: Shows::default(),
+            revision: 0,
+            meter: Meter::default(),
+            output: "vitrum.png".into(),
+            recent: Vec::new(),
+        })
+    }
+
+    pub(super) fn model(&self) -> Model {
+        model_of(&self.args)
+    }
+
+    /// Another scene in the place of this one; what cannot be read leaves it, and is said.
+    pub(super) fn open(&mut self, path: PathBuf) -> bool {
+        self.replace(Some(path), None)
+    }
+
+    /// The same files again, seen from where the camera is.
+    pub(super) fn reload(&mut self) -> bool {
+        let camera = (!self.scene.framed && self.scene.camera != self.before.camera).then_some(self.scene.camera);
+        self.replace(self.path.clone(), camera)
+    }
+
+    fn replace(&mut self, path: Option<PathBuf>, camera: Option<Camera>) -> bool {
+        let again = path == self.path;
+        let args = match again {
+            true => self.args.clone(),
+            // What was said of the scene before does not hold for another.
+            false => RenderArgs { ior: None, roughness: None, env: None, set: None, ..self.args.clone() },
+        };
+        let size = self.args.size.filter(|_| self.sized);
+        match Self::new(Options { scene: path, args: RenderArgs { size, ..args } }) {
+            Ok(mut new) => {
+                if let Some(camera) = camera {
+                    (new.scene.camera, new.scene.framed) = (camera, false);
+                }
+                *self = Self {
+                    pictures: std::mem::take(&mut self.pictures),
+                    meter: std::mem::take(&mut self.meter),
+                    output: std::mem::take(&mut self.output),
+                    recent: std::mem::take(&mut self.recent),
+                    revision: self.revision,
+                    wipe: self.wipe,
+                    ..new
+                };
+                true
+            }
+            Err(error) => {
+                self.error = Some(error.in_full());
+                false
+            }
+        }
+    }
+
+    /// Another environment, if it can be read.
+    pub(super) fn surround(&mut self, path: PathBuf) -> bool {
+        let overrides = Overrides { environment: Some(path.clone()), ..Overrides::default() };
+        match Scene::load(self.path.as_deref(), &overrides) {
+            Ok(scene) => {
+                self.before.environment.light = scene.environment.light.clone();
+                self.scene.environment.light = scene.environment.light;
+                self.args.env = Some(path);
+                self.error = None;
+                true
+            }
+            Err(error) => {
+                self.error = Some(error.in_full());
+                false
+            }
+        }
+    }
+
+    pub(super) fn size(&self) -> Size {
+        self.args.size.unwrap_or(Size { width: 1, height: 1 })
+    }
+
+    pub(super) fn drag(&mut self, by: impl FnOnce(Camera) -> Camera) {
+        let size = self.size();
+        self.scene.frame(f64::from(size.width) / f64::from(size.height));
+        let camera = by(self.scene.camera);
+        if let Ok(camera) = Camera::new(camera.position, camera.target, camera.up, camera.vertical_fov) {
+            (self.scene.camera, self.scene.framed) = (camera, false);
+        }
+    }
+
+    /// The pictures of what there is now.
+    pub(super) fn wanted(&self, asked: Instant, moving: bool) -> Wanted {
+        let size = self.size();
+        let framed = |mut scene: Scene| {
+            scene.frame(f64::from(size.width) / f64::from(size.height));
+            scene
+        };
+        let scene = framed(self.scene.clone());
+        let shows = |model| if self.shows.is_of(model) { self.shows } else { Shows::Light };
+        let mut shots =
+            vec![Shot { scene: scene.clone(), args: self.args.clone(), shows: shows(model_of(&self.args)) }];
+        if let Some(beside) = &self.beside {
+            let (camera, framed) = (scene.camera, scene.framed);
+            let scene = match &beside.scene {
+                Some(scene) => Scene { camera, framed, ..scene.clone() },
+                None => scene,
+            };
+            let look = RenderArgs { exposure: self.args.exposure, tonemap: self.args.tonemap, ..beside.args.clone() };
+            let args = RenderArgs { size: self.args.size, ..look };
+            let shows = shows(model_of(&args));
+            shots.push(Shot { scene, args, shows });
+        }
+        Wanted { revision: self.revision, shots, pixel: None, moving, asked }
+    }
+
+    /// Whether an effect is on, off, or as the scene calls for it (`None`).
+    pub(super) fn wish(&self, effect: Effect) -> Option<bool> {
+        self.args.effects.as_ref().and_then(|selection| selection.wish(effect))
+    }
+
+    pub(super) fn set_wish(&mut self, effect: Effect, wish: Option<bool>) {
+        let wishes = Effect::all().map(|one| (one, if one == effect { wish } else { self.wish(one) }));
+        let selection = Selection::of_wishes(wishes);
+        self.args.effects = (selection != Selection::default()).then_some(selection);
+    }
+
+    /// What in the scene calls for an effect.
+    pub(super) fn why(&self, effect: Effect) -> String {
+        let named = |object: usize| &self.scene.meshes[self.scene.objects[object].mesh].name;
+        match effect.callers(&self.scene).next() {
+            None => effect.absent().into(),
+            Some(Caller::Material { material, why }) => format!("{}: {why}", self.scene.materials[material].name),
+            Some(Caller::Light(number)) => format!("point light {number}"),
+            Some(Caller::Parts(object)) => format!("bodies in {} may overlap", named(object)),
+            Some(Caller::Pair(one, other)) => format!("{} and {} may overlap", named(one), named(other)),
+            Some(Caller::Camera(object)) => format!("the camera may be in {}", named(object)),
+        }
+    }
+
+    /// Options of `vitrum render` that repeat the picture.
+    pub(super) fn options(&self) -> Vec<String> {
+        let mut words: Vec<String> = self.path.iter().map(|path| path.display().to_string()).collect();
+        let mut settings = self.args.set.clone().unwrap_or_default();
+        settings.extend(self.scene.settings_since(&self.before));
+        let idle = RenderArgs { set: (!settings.is_empty()).then_some(settings), stats: None, ..self.args.clone() };
+        words.extend(idle.words());
+        words.extend(self.args.device.iter().map(|device| format!("--device={device}")));
+        words
+    }
+
+    /// The command that repeats the picture, for a shell.
+    pub(super) fn command(&self) -> String {
+        let words = ["vitrum".to_owned(), "render".to_owned()].into_iter().chain(self.options());
+        let words = words.chain(["-o".to_owned(), self.output.clone()]);
+        words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" ")
+    }
+
+    /// Puts a file in front of those that were open last.
+    pub(super) fn remember(&mut self, path: &Path) {
+        let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+        self.recent.retain(|other| *other != path);
+        self.recent.insert(0, path);
+        self.recent.truncate(10);
+    }
+}
+
+pub(super) fn model_of(args: &RenderArgs) -> Model {
+    match args.model {
+        Some(ModelChoice::Only(model)) => model,
+        _ => Model::Single,
+    }
+}
+
+/// A word as a POSIX shell reads it back.
+fn quoted(word: &str) -> String {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=+,./:@%".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_quoted_for_a_shell() {
+        assert_eq!(quoted("--set=camera.up=[0,1,0]"), "'--set=camera.up=[0,1,0]'");
+        assert_eq!(quoted("it's"), r"'it'\''s'");
+        assert_eq!(quoted(""), "''");
+        assert_eq!(quoted("--model=tree"), "--model=tree");
+    }
+
+    #[test]
+    fn the_command_has_what_was_changed() {
+        let mut state = State::new(Options { scene: None, args: RenderArgs::default() }).expect("the built-in scene");
+        assert_eq!(state.command(), "vitrum render -o vitrum.png");
+        state.args.size = Some(Size { width: 640, height: 360 });
+        state.args.model = Some(Model::Tree.into());
+        state.set_wish(Effect::Nesting, Some(false));
+        state.set_wish(Effect::Opaque, Some(true));
+        assert_eq!(
+            state.command(),
+            "vitrum render --model=tree --size=640x360 --effects=auto,opaque,-nesting -o vitrum.png"
+        );
+        assert_eq!((state.wish(Effect::Nesting), state.wish(Effect::Opaque)), (Some(false), Some(true)));
+        assert_eq!(state.wish(Effect::Shadows), None);
+        state.set_wish(Effect::Nesting, None);
+        state.set_wish(Effect::Opaque, None);
+        state.drag(|camera| Camera { position: camera.position + glam::DVec3::X, ..camera });
+        assert!(state.command().contains(" '--set=camera.position=["), "{}", state.command());
+        assert!(!state.command().contains("effects"), "{}", state.command());
+    }
+
+    #[test]
+    fn what_cannot_be_opened_leaves_what_there_is() {
+        let mut state = State::new(Options { scene: None, args: RenderArgs::default() }).expect("the built-in scene");
+        assert!(!state.open("no/such.toml".into()));
+        assert!(state.error.as_ref().is_some_and(|error| error.contains("no/such.toml")), "{:?}", state.error);
+        assert_eq!(state.scene.name, "built-in");
+        assert!(!state.surround("no/such.exr".into()));
+        assert!(state.args.env.is_none());
+    }
+}
