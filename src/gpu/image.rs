@@ -23,7 +23,7 @@ pub enum Use {
     Sampled,
     /// Read and written by compute shaders.
     Storage,
-    /// Copied from.
+    /// Copied from, scaled or not.
     CopySource,
     /// Copied to.
     CopyTarget,
@@ -56,7 +56,7 @@ impl Use {
             ),
             Self::Sampled => (Stage::FRAGMENT_SHADER | Stage::COMPUTE_SHADER, Access::SHADER_SAMPLED_READ),
             Self::Storage => (Stage::COMPUTE_SHADER, Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE),
-            Self::CopySource => (Stage::COPY, Access::TRANSFER_READ),
+            Self::CopySource => (Stage::COPY | Stage::BLIT, Access::TRANSFER_READ),
             Self::CopyTarget => (Stage::COPY, Access::TRANSFER_WRITE),
         }
     }
@@ -82,8 +82,8 @@ pub enum Format {
     Rgba32Float,
     /// Four 16-bit floats.
     Rgba16Float,
-    /// Four bytes, from 0 to 1.
-    Rgba8,
+    /// Four bytes, blue first, that hold sRGB. Shaders read and write them as they are, blits and screens as the light that they mean.
+    Bgra8Srgb,
     /// A whole number of 32 bits.
     R32Uint,
     /// A depth of 32-bit float.
@@ -95,9 +95,17 @@ impl Format {
         match self {
             Self::Rgba32Float => vk::Format::R32G32B32A32_SFLOAT,
             Self::Rgba16Float => vk::Format::R16G16B16A16_SFLOAT,
-            Self::Rgba8 => vk::Format::R8G8B8A8_UNORM,
+            Self::Bgra8Srgb => vk::Format::B8G8R8A8_SRGB,
             Self::R32Uint => vk::Format::R32_UINT,
             Self::Depth32 => vk::Format::D32_SFLOAT,
+        }
+    }
+
+    /// How shaders see it.
+    pub(super) fn view(self) -> vk::Format {
+        match self {
+            Self::Bgra8Srgb => vk::Format::B8G8R8A8_UNORM,
+            other => other.handle(),
         }
     }
 
@@ -105,7 +113,7 @@ impl Format {
         match self {
             Self::Rgba32Float => 16,
             Self::Rgba16Float => 8,
-            Self::Rgba8 | Self::R32Uint | Self::Depth32 => 4,
+            Self::Bgra8Srgb | Self::R32Uint | Self::Depth32 => 4,
         }
     }
 }
@@ -150,10 +158,9 @@ impl Image {
             });
         }
         let extent = vk::Extent2D { width: desc.width, height: desc.height };
-        // What a screen shows is encoded already, and looked at as sRGB: `Screen::set_picture`.
-        let flags = match desc.format {
-            Format::Rgba8 => vk::ImageCreateFlags::MUTABLE_FORMAT,
-            _ => vk::ImageCreateFlags::empty(),
+        let flags = match desc.format.view() == desc.format.handle() {
+            true => vk::ImageCreateFlags::empty(),
+            false => vk::ImageCreateFlags::MUTABLE_FORMAT,
         };
         let info = vk::ImageCreateInfo::default()
             .flags(flags)
@@ -190,7 +197,7 @@ impl Image {
         let view = vk::ImageViewCreateInfo::default()
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)
-            .format(desc.format.handle())
+            .format(desc.format.view())
             .subresource_range(image.range());
         // SAFETY: the image is bound to memory, and the view names its own format and its only level.
         image.view = unsafe { gpu.device.create_image_view(&view, None) }.context("vkCreateImageView")?;

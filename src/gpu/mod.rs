@@ -28,7 +28,7 @@ pub use image::{Format, Image, ImageDesc, Use};
 pub use instance::{DeviceInfo, DeviceKind, Instance, Messages};
 pub use memory::{Buffer, BufferDesc, BufferUse};
 pub use pipeline::{ComputePipeline, Depth, GraphicsPipeline, GraphicsPipelineDesc, Specialization};
-pub use screen::{Screen, Shown as OnScreen, Surface};
+pub use screen::{Placed, Screen, Shown as OnScreen, Surface};
 pub use shader::{Shader, compiled as shaders};
 pub use shared::{Frame, InstanceRecord, LightRecord, MaterialRecord, Matrix4x3, SamplePush};
 

@@ -169,7 +169,7 @@ impl GraphicsPipeline {
             vk::DynamicState::FRONT_FACE,
         ]);
         let depth_format = if desc.depth == Depth::Ignored { vk::Format::UNDEFINED } else { Format::Depth32.handle() };
-        let colors: Vec<_> = desc.colors.iter().map(|color| color.handle()).collect();
+        let colors: Vec<_> = desc.colors.iter().map(|color| color.view()).collect();
         let mut targets = vk::PipelineRenderingCreateInfo::default()
             .color_attachment_formats(&colors)
             .depth_attachment_format(depth_format);

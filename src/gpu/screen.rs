@@ -1,6 +1,6 @@
 //! A window's surface, on which egui draws. In flow a window and what egui made of a frame, out flow presented pictures.
 //!
-//! The egui side is `egui-ash-renderer`, on dynamic rendering. Pictures are drawn where they are, without a copy. One frame is in flight.
+//! The egui side is `egui-ash-renderer`, on dynamic rendering, over pictures that are copied to the screen. One frame is in flight.
 
 use std::sync::{Arc, PoisonError};
 
@@ -22,6 +22,19 @@ pub enum Shown {
     Not,
 }
 
+/// A picture on the screen. It is of [`Format::Bgra8Srgb`](super::Format::Bgra8Srgb), and was last used as [`Use::CopySource`](super::Use::CopySource).
+#[derive(Clone)]
+pub struct Placed {
+    /// The picture.
+    pub image: Arc<Image>,
+    /// Where all of it would be, in pixels of the window.
+    pub at: [i32; 2],
+    /// How large it is there.
+    pub size: [u32; 2],
+    /// The columns of the window that it may cover, from the first to before the last.
+    pub columns: [i32; 2],
+}
+
 /// A window that pictures are shown in.
 pub struct Screen {
     // Dropped in `drop`, before the device that it is on.
@@ -38,8 +51,6 @@ pub struct Screen {
     acquired: vk::Semaphore,
     /// Textures that the frame before may still have shown.
     freed: Vec<egui::TextureId>,
-    /// What the last frame may have shown, by its number.
-    pictures: Vec<Option<Picture>>,
     gpu: Gpu,
     /// Held so that it outlives the surface.
     window: Arc<Window>,
@@ -116,11 +127,11 @@ impl Screen {
         let modes = modes.context("vkGetPhysicalDeviceSurfacePresentModesKHR")?;
         // Encoded by the device, exactly: what egui-ash-renderer does itself is a power of 2.2.
         let wanted = [vk::Format::B8G8R8A8_SRGB, vk::Format::R8G8B8A8_SRGB];
-        let format = formats.iter().find(|format| wanted.contains(&format.format)).or(formats.first());
+        let has = |wanted: &vk::Format| formats.iter().find(|format| format.format == *wanted);
+        let format = wanted.iter().find_map(has);
         let format = *format.ok_or_else(|| GpuError::CannotShow { name: info.name.clone() })?;
         let mailbox = modes.contains(&vk::PresentModeKHR::MAILBOX);
         let present_mode = if mailbox { vk::PresentModeKHR::MAILBOX } else { vk::PresentModeKHR::FIFO };
-        let srgb = wanted.contains(&format.format);
 
         let instance = &gpu.instance.handle;
         let mut screen = Self {
@@ -136,7 +147,6 @@ impl Screen {
             fence: vk::Fence::null(),
             acquired: vk::Semaphore::null(),
             freed: Vec::new(),
-            pictures: Vec::new(),
             gpu: gpu.clone(),
             window: surface.window.clone(),
         };
@@ -145,7 +155,7 @@ impl Screen {
             depth_attachment_format: None,
             stencil_attachment_format: None,
         });
-        let options = Options { srgb_framebuffer: srgb, ..Options::default() };
+        let options = Options { srgb_framebuffer: true, ..Options::default() };
         let pool = vk::CommandPoolCreateInfo::default().queue_family_index(info.queue_family);
         // SAFETY: the infos point to locals; whatever fails, dropping `screen` destroys what was made and ignores nulls.
         unsafe {
@@ -160,23 +170,6 @@ impl Screen {
                 .map_err(failed)?,
         );
         Ok(screen)
-    }
-
-    /// Puts `image`, of [`Format::Rgba8`](super::Format::Rgba8), last used as [`Use::Sampled`](super::Use::Sampled) and encoded as
-    /// sRGB, in the place of the picture of that number; what egui knows it by.
-    pub fn set_picture(&mut self, number: usize, image: Arc<Image>) -> Result<egui::TextureId> {
-        let Some(egui) = &mut self.egui else { return Err(GpuError::Interface("nothing draws".into())) };
-        let mut picture = Picture::new(&self.gpu, image)?;
-        let id = egui.add_user_texture(picture.set);
-        picture.id = id;
-        if self.pictures.len() <= number {
-            self.pictures.resize_with(number + 1, || None);
-        }
-        // The last frame was waited for: what it showed may go.
-        if let Some(before) = self.pictures[number].replace(picture) {
-            egui.remove_user_texture(before.id);
-        }
-        Ok(id)
     }
 
     /// Takes over textures that changed, and those that are gone.
@@ -196,8 +189,13 @@ impl Screen {
         Ok(())
     }
 
-    /// Shows what egui tessellated.
-    pub fn draw(&mut self, pixels_per_point: f32, primitives: &[egui::ClippedPrimitive]) -> Result<Shown> {
+    /// Shows pictures, the later ones in front, and before them what egui tessellated.
+    pub fn draw(
+        &mut self,
+        pictures: &[Placed],
+        pixels_per_point: f32,
+        primitives: &[egui::ClippedPrimitive],
+    ) -> Result<Shown> {
         if !self.fit()? {
             return Ok(Shown::Not);
         }
@@ -218,7 +216,7 @@ impl Screen {
         let color = [vk::RenderingAttachmentInfo::default()
             .image_view(swapchain.views[index as usize])
             .image_layout(vk::ImageLayout::COLOR_ATTACHMENT_OPTIMAL)
-            .load_op(vk::AttachmentLoadOp::CLEAR)
+            .load_op(vk::AttachmentLoadOp::LOAD)
             .store_op(vk::AttachmentStoreOp::STORE)];
         let rendering =
             vk::RenderingInfo::default().render_area(swapchain.extent.into()).layer_count(1).color_attachments(&color);
@@ -229,9 +227,26 @@ impl Screen {
         unsafe {
             device.reset_command_pool(self.pool, Default::default()).context("vkResetCommandPool")?;
             device.begin_command_buffer(self.buffer, &begin).context("vkBeginCommandBuffer")?;
-            let from = (output, Access::NONE, Layout::UNDEFINED);
-            let to = (output, Access::COLOR_ATTACHMENT_WRITE, Layout::COLOR_ATTACHMENT_OPTIMAL);
-            transition(device, self.buffer, image, from, to);
+            let copies = Stage::CLEAR | Stage::COPY | Stage::BLIT;
+            let filled = (copies, Access::TRANSFER_WRITE, Layout::TRANSFER_DST_OPTIMAL);
+            let access = Access::COLOR_ATTACHMENT_READ | Access::COLOR_ATTACHMENT_WRITE;
+            let to = (output, access, Layout::COLOR_ATTACHMENT_OPTIMAL);
+            transition(device, self.buffer, image, (output, Access::NONE, Layout::UNDEFINED), filled);
+            let whole = [vk::ImageSubresourceRange::default()
+                .aspect_mask(vk::ImageAspectFlags::COLOR)
+                .level_count(1)
+                .layer_count(1)];
+            let covers = pictures.iter().any(|picture| picture.covers(swapchain.extent));
+            if !covers {
+                device.cmd_clear_color_image(self.buffer, image, filled.2, &BACKGROUND, &whole);
+            }
+            for (number, picture) in pictures.iter().enumerate() {
+                if number > 0 || !covers {
+                    transition(device, self.buffer, image, filled, filled);
+                }
+                picture.copy(device, self.buffer, image, self.format.format, swapchain.extent);
+            }
+            transition(device, self.buffer, image, filled, to);
             device.cmd_begin_rendering(self.buffer, &rendering);
             egui.cmd_draw(self.buffer, swapchain.extent, pixels_per_point, primitives).map_err(failed)?;
             device.cmd_end_rendering(self.buffer);
@@ -293,6 +308,9 @@ impl Screen {
         if extent.width == 0 || extent.height == 0 {
             return Ok(false);
         }
+        if !can.supported_usage_flags.contains(vk::ImageUsageFlags::TRANSFER_DST) {
+            return Err(GpuError::CannotShow { name: info.name.clone() });
+        }
         if self.swapchain.as_ref().is_some_and(|swapchain| swapchain.extent == extent) {
             return Ok(true);
         }
@@ -307,7 +325,7 @@ impl Screen {
             .image_color_space(self.format.color_space)
             .image_extent(extent)
             .image_array_layers(1)
-            .image_usage(vk::ImageUsageFlags::COLOR_ATTACHMENT)
+            .image_usage(vk::ImageUsageFlags::COLOR_ATTACHMENT | vk::ImageUsageFlags::TRANSFER_DST)
             .pre_transform(can.current_transform)
             .composite_alpha(alpha.unwrap_or(vk::CompositeAlphaFlagsKHR::OPAQUE))
             .present_mode(self.present_mode)
@@ -364,7 +382,6 @@ impl Drop for Screen {
     fn drop(&mut self) {
         self.forget();
         self.egui = None;
-        self.pictures.clear();
         // SAFETY: every frame was waited for; what was not made is null and ignored. The surface goes before its window.
         unsafe {
             let device = &self.gpu.device;
@@ -376,83 +393,88 @@ impl Drop for Screen {
     }
 }
 
-/// A picture as egui's pipeline sees it.
-struct Picture {
-    id: egui::TextureId,
-    set: vk::DescriptorSet,
-    layout: vk::DescriptorSetLayout,
-    pool: vk::DescriptorPool,
-    view: vk::ImageView,
-    sampler: vk::Sampler,
-    /// Held while it is shown.
-    image: Arc<Image>,
-    gpu: Gpu,
+/// Behind pictures that do not fill the window: a dark grey.
+const BACKGROUND: vk::ClearColorValue = vk::ClearColorValue { float32: [0.009, 0.009, 0.009, 1.0] };
+
+/// A part of two images that are laid on each other: where it starts and ends, in each.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+struct Part {
+    source: [[i32; 2]; 2],
+    target: [[i32; 2]; 2],
 }
 
-impl Picture {
-    fn new(gpu: &Gpu, image: Arc<Image>) -> Result<Self> {
-        const KIND: vk::DescriptorType = vk::DescriptorType::COMBINED_IMAGE_SAMPLER;
-        let mut picture = Self {
-            id: egui::TextureId::default(),
-            set: vk::DescriptorSet::null(),
-            layout: vk::DescriptorSetLayout::null(),
-            pool: vk::DescriptorPool::null(),
-            view: vk::ImageView::null(),
-            sampler: vk::Sampler::null(),
-            image,
-            gpu: gpu.clone(),
-        };
-        let image = &picture.image;
-        let view = vk::ImageViewCreateInfo::default()
-            .image(image.handle)
-            .view_type(vk::ImageViewType::TYPE_2D)
-            .format(vk::Format::R8G8B8A8_SRGB)
-            .subresource_range(image.range());
-        let sampler = vk::SamplerCreateInfo::default()
-            .mag_filter(vk::Filter::LINEAR)
-            .min_filter(vk::Filter::LINEAR)
-            .address_mode_u(vk::SamplerAddressMode::CLAMP_TO_EDGE)
-            .address_mode_v(vk::SamplerAddressMode::CLAMP_TO_EDGE);
-        let sizes = [vk::DescriptorPoolSize { ty: KIND, descriptor_count: 1 }];
-        let pool = vk::DescriptorPoolCreateInfo::default().max_sets(1).pool_sizes(&sizes);
-        // As egui's renderer makes them for its own textures.
-        let bindings = [vk::DescriptorSetLayoutBinding::default()
-            .descriptor_type(KIND)
-            .descriptor_count(1)
-            .stage_flags(vk::ShaderStageFlags::FRAGMENT)];
-        let layout = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-        let device = &gpu.device;
-        // SAFETY: the infos point to locals; the image was made with a format that can be changed, and is held; whatever fails,
-        // dropping `picture` destroys what was made and ignores nulls.
-        unsafe {
-            picture.view = device.create_image_view(&view, None).context("vkCreateImageView")?;
-            picture.sampler = device.create_sampler(&sampler, None).context("vkCreateSampler")?;
-            picture.pool = device.create_descriptor_pool(&pool, None).context("vkCreateDescriptorPool")?;
-            picture.layout =
-                device.create_descriptor_set_layout(&layout, None).context("vkCreateDescriptorSetLayout")?;
-            let layouts = [picture.layout];
-            let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(picture.pool).set_layouts(&layouts);
-            picture.set = device.allocate_descriptor_sets(&info).context("vkAllocateDescriptorSets")?[0];
-            let image = [vk::DescriptorImageInfo::default()
-                .sampler(picture.sampler)
-                .image_view(picture.view)
-                .image_layout(vk::ImageLayout::SHADER_READ_ONLY_OPTIMAL)];
-            let write = vk::WriteDescriptorSet::default().dst_set(picture.set).descriptor_type(KIND).image_info(&image);
-            device.update_descriptor_sets(&[write], &[]);
+impl Placed {
+    /// What of it is seen in a window of such a size, cut where texels end.
+    fn part(&self, extent: vk::Extent2D) -> Option<Part> {
+        let texels = [self.image.width(), self.image.height()];
+        let ends = [extent.width as i32, extent.height as i32];
+        let mut part = Part { source: [[0; 2]; 2], target: [[0; 2]; 2] };
+        for axis in 0..2 {
+            let (at, size) = (i64::from(self.at[axis]), i64::from(self.size[axis]));
+            let (mut low, mut high) = (0, i64::from(ends[axis]));
+            if axis == 0 {
+                (low, high) = (low.max(self.columns[0].into()), high.min(self.columns[1].into()));
+            }
+            let (low, high) = (low.max(at), high.min(at + size));
+            if low >= high || size == 0 {
+                return None;
+            }
+            let texel = |place: i64, up: bool| {
+                let scaled = (place - at) * i64::from(texels[axis]);
+                (if up { (scaled + size - 1) / size } else { scaled / size }) as i32
+            };
+            let (first, last) = (texel(low, false), texel(high, true));
+            let place = |texel: i32| (at + i64::from(texel) * size / i64::from(texels[axis])) as i32;
+            (part.source[0][axis], part.source[1][axis]) = (first, last);
+            // What is cut in the middle of a texel starts there.
+            part.target[0][axis] = place(first).max(low as i32);
+            part.target[1][axis] = place(last).min(high as i32);
         }
-        Ok(picture)
+        Some(part)
     }
-}
 
-impl Drop for Picture {
-    fn drop(&mut self) {
-        // SAFETY: every frame was waited for; the set goes with its pool.
+    /// Whether it fills a window of such a size.
+    fn covers(&self, extent: vk::Extent2D) -> bool {
+        let ends = [[0, 0], [extent.width as i32, extent.height as i32]];
+        self.part(extent).is_some_and(|part| part.target == ends)
+    }
+
+    /// # Safety
+    ///
+    /// The buffer is being recorded outside of rendering, and `target`, of this format and extent, is alive and ready to be copied to.
+    unsafe fn copy(
+        &self,
+        device: &ash::Device,
+        buffer: vk::CommandBuffer,
+        target: vk::Image,
+        format: vk::Format,
+        extent: vk::Extent2D,
+    ) {
+        let Some(Part { source, target: place }) = self.part(extent) else { return };
+        let layers = vk::ImageSubresourceLayers::default().aspect_mask(vk::ImageAspectFlags::COLOR).layer_count(1);
+        let offset = |[x, y]: [i32; 2], z| vk::Offset3D { x, y, z };
+        let size = |[from, to]: [[i32; 2]; 2]| [to[0] - from[0], to[1] - from[1]];
+        let (from, to) = (vk::ImageLayout::TRANSFER_SRC_OPTIMAL, vk::ImageLayout::TRANSFER_DST_OPTIMAL);
+        let handle = self.image.handle;
+        // SAFETY: as the caller promises; the parts lie in both images, and the picture is held by whoever draws.
         unsafe {
-            let device = &self.gpu.device;
-            device.destroy_descriptor_pool(self.pool, None);
-            device.destroy_descriptor_set_layout(self.layout, None);
-            device.destroy_sampler(self.sampler, None);
-            device.destroy_image_view(self.view, None);
+            if size(source) == size(place) && format == self.image.format.handle() {
+                let [width, height] = size(source).map(|side| side as u32);
+                let region = vk::ImageCopy::default()
+                    .src_subresource(layers)
+                    .src_offset(offset(source[0], 0))
+                    .dst_subresource(layers)
+                    .dst_offset(offset(place[0], 0))
+                    .extent(vk::Extent3D { width, height, depth: 1 });
+                device.cmd_copy_image(buffer, handle, from, target, to, &[region]);
+            } else {
+                let region = vk::ImageBlit::default()
+                    .src_subresource(layers)
+                    .src_offsets([offset(source[0], 0), offset(source[1], 1)])
+                    .dst_subresource(layers)
+                    .dst_offsets([offset(place[0], 0), offset(place[1], 1)]);
+                device.cmd_blit_image(buffer, handle, from, target, to, &[region], vk::Filter::LINEAR);
+            }
         }
     }
 }

@@ -10,7 +10,7 @@ use crate::gpu::{
 use crate::plan::Plan;
 
 /// Encoded by the shader, so that the tone curve sees the same values on every kind of target.
-const DISPLAY: Format = Format::Rgba8;
+pub(super) const DISPLAY: Format = Format::Bgra8Srgb;
 
 pub(super) struct Display {
     pipeline: GraphicsPipeline,
@@ -42,7 +42,7 @@ impl Display {
         Ok(Self { pipeline })
     }
 
-    /// An image of sRGB values, ready to be sampled, and the time of the pass.
+    /// An image of sRGB values, ready to be copied, and the time of the pass.
     pub(super) fn run(
         &self,
         commands: &mut Commands,
@@ -56,7 +56,7 @@ impl Display {
                 width: targets.mean.width(),
                 height: targets.mean.height(),
                 format: DISPLAY,
-                uses: &[Use::ColorTarget, Use::CopySource, Use::Sampled],
+                uses: &[Use::ColorTarget, Use::CopySource],
             },
         )?;
         let push = Push { scale: plan.exposure.exp2() as f32, curve: plan.tonemap as u32 };
@@ -67,7 +67,7 @@ impl Display {
                     pass.bind(&self.pipeline, &targets.display);
                     pass.draw(&push, 3, Sides::default());
                 });
-                cmd.use_image(&screen, Use::Sampled);
+                cmd.use_image(&screen, Use::CopySource);
             });
         })?;
         Ok((screen, time))

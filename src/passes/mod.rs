@@ -39,7 +39,7 @@ use crate::scene::Scene;
 use accumulate::Accumulate;
 use aov::AovPass;
 use checkpoint::{Checkpoint, Progress};
-use display::Display;
+use display::{DISPLAY, Display};
 use double::{Double, DoubleTargets};
 use environment::EnvironmentPass;
 use geometry::Draw;
@@ -230,12 +230,13 @@ impl Renderer {
         Ok(picture.targets.counts(&mut self.commands, &mean, picture.samples)?)
     }
 
-    /// An image of these sRGB values, row 0 at the top, ready to be sampled as that of [`display`](Self::display).
+    /// An image of these sRGB values, row 0 at the top, ready to be copied as that of [`display`](Self::display).
     pub fn image_of(&mut self, Size { width, height }: Size, pixels: &[[u8; 4]]) -> crate::Result<Image> {
-        let uses = &[Use::CopyTarget, Use::Sampled];
-        let desc = ImageDesc { name: "pixels", width, height, format: Format::Rgba8, uses };
-        let image = self.commands.upload_image(&desc, pixels.as_flattened())?;
-        self.commands.run(|cmd| cmd.use_image(&image, Use::Sampled))?;
+        let uses = &[Use::CopyTarget, Use::CopySource];
+        let desc = ImageDesc { name: "pixels", width, height, format: DISPLAY, uses };
+        let texels: Vec<u8> = pixels.iter().flat_map(|&[r, g, b, a]| [b, g, r, a]).collect();
+        let image = self.commands.upload_image(&desc, &texels)?;
+        self.commands.run(|cmd| cmd.use_image(&image, Use::CopySource))?;
         Ok(image)
     }
 
@@ -244,7 +245,7 @@ impl Renderer {
         Ok(radiance(&self.commands.read_image(&picture.targets.mean)?)?)
     }
 
-    /// What a screen shows of the picture, after a round at least: sRGB values, ready to be sampled.
+    /// What a screen shows of the picture, after a round at least: sRGB values, ready to be copied.
     pub fn display(&mut self, picture: &mut Refinement) -> crate::Result<Image> {
         let (image, times) = self.passes.display.run(&mut self.commands, &picture.targets, &picture.plan)?;
         picture.times.add(times);
@@ -274,7 +275,8 @@ impl Renderer {
 
         let (display, time) = passes.display.run(commands, &targets, plan)?;
         times.add(time);
-        let display = bytemuck::allocation::pod_collect_to_vec(&commands.read_image(&display)?);
+        let mut display: Vec<[u8; 4]> = bytemuck::allocation::pod_collect_to_vec(&commands.read_image(&display)?);
+        display.iter_mut().for_each(|pixel| pixel.swap(0, 2));
         let mean = commands.read_image(&targets.mean)?;
         let radiance = radiance(&mean)?;
         let counts = targets.counts(commands, &mean, samples)?;

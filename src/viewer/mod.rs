@@ -78,7 +78,6 @@ struct Shown {
     survey: Survey,
     screen: Screen,
     egui: egui_winit::State,
-    textures: [Option<egui::TextureId>; 2],
     /// When something changed last, until the whole picture is asked for.
     changed: Option<Instant>,
     /// When it was that what was asked for last was asked for.
@@ -116,6 +115,7 @@ impl App {
         let gpu = Gpu::open(&instance, instance.choose(state.args.device.as_deref())?)?;
         let screen = Screen::new(&gpu, surface)?;
         let context = egui::Context::default();
+        context.all_styles_mut(|style| style.visuals.window_shadow = egui::Shadow::NONE);
         let scale = Some(window.scale_factor() as f32);
         let side = Some(gpu.max_image_side() as usize);
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, scale, window.theme(), side);
@@ -134,7 +134,6 @@ impl App {
             survey,
             screen,
             egui,
-            textures: [None, None],
             changed: Some(now),
             asked: now,
             heard: None,
@@ -158,8 +157,7 @@ impl App {
             session.actions.push(Action::Open(file.path().to_path_buf()));
         }
         let context = shown.egui.egui_ctx().clone();
-        let textures = shown.textures;
-        let output = context.run_ui(input, |ui| edits.add(panels::all(ui, session, textures)));
+        let output = context.run_ui(input, |ui| edits.add(panels::all(ui, session)));
         if edits.any() {
             (session.state.error, session.state.notice) = (None, None);
         }
@@ -173,7 +171,7 @@ impl App {
         if !waits {
             shown.window.set_title(&format!("{} - Vitrum", session.state.scene.name));
             let primitives = context.tessellate(output.shapes, output.pixels_per_point);
-            if shown.screen.draw(output.pixels_per_point, &primitives)? == OnScreen::Not {
+            if shown.screen.draw(&session.placed, output.pixels_per_point, &primitives)? == OnScreen::Not {
                 let size = shown.window.inner_size();
                 if size.width > 0 && size.height > 0 {
                     shown.window.request_redraw();
@@ -203,7 +201,6 @@ impl Shown {
             match news {
                 News::Picture(picture) => {
                     let number = picture.number;
-                    self.textures[number] = Some(self.screen.set_picture(number, picture.image.clone())?);
                     if number == 0 {
                         timed = Some((picture.asked, picture.moving, picture.size != picture.whole));
                         if picture.size == picture.whole {

@@ -9,6 +9,7 @@ use super::state::State;
 use super::survey::{Measured, Query};
 use super::worker::Picture;
 use crate::choice::Measurements;
+use crate::gpu::Placed;
 
 /// Pictures whose times are plotted.
 const HISTORY: usize = 120;
@@ -88,6 +89,8 @@ pub(super) struct Session {
     pub(super) cost: Cost,
     pub(super) pixel: Pixel,
     pub(super) actions: Vec<Action>,
+    /// The pictures in their places, of this frame.
+    pub(super) placed: Vec<Placed>,
     /// What the survey was asked last.
     asked: Option<(u64, bool, bool, Option<[u32; 2]>)>,
 }
@@ -95,7 +98,7 @@ pub(super) struct Session {
 impl Session {
     pub(super) fn new(state: State) -> Self {
         let (cost, pixel) = (Cost::default(), Pixel::default());
-        Self { state, cost, pixel, actions: Vec::new(), asked: None }
+        Self { state, cost, pixel, actions: Vec::new(), placed: Vec::new(), asked: None }
     }
 
     /// What is to be measured of what is at rest, if that is not under way already.

@@ -8,12 +8,14 @@ mod render;
 
 use egui::{
     Align2, Color32, Context, CursorIcon, Painter, Pos2, Rect, Response, RichText, Sense, Slider, SliderClamping,
-    Stroke, TextureId, Ui, Window, pos2, vec2,
+    Stroke, Ui, Window, pos2, vec2,
 };
 
 use super::session::Session;
 use super::state::{Edits, model_of};
+use super::worker::Picture;
 use super::{heights, orbit};
+use crate::gpu::Placed;
 use crate::options::Size;
 use crate::scene::{Bounds, Scene};
 
@@ -25,9 +27,9 @@ const MARGIN: f32 = 10.0;
 const FOLDED: f32 = 38.0;
 
 /// All of them, around the picture.
-pub(super) fn all(ui: &mut Ui, session: &mut Session, textures: [Option<TextureId>; 2]) -> Edits {
+pub(super) fn all(ui: &mut Ui, session: &mut Session) -> Edits {
     let mut edits = Edits::default();
-    picture(ui, session, textures, &mut edits);
+    picture(ui, session, &mut edits);
     let context = ui.ctx().clone();
     let area = context.content_rect();
     let roomy = area.height() > 560.0;
@@ -85,7 +87,7 @@ impl<'c> Column<'c> {
 }
 
 /// The picture behind all, with the camera in the pointer's hands.
-fn picture(ui: &mut Ui, session: &mut Session, textures: [Option<TextureId>; 2], edits: &mut Edits) {
+fn picture(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     let state = &mut session.state;
     let area = ui.max_rect();
     let scale = ui.ctx().pixels_per_point();
@@ -97,19 +99,23 @@ fn picture(ui: &mut Ui, session: &mut Session, textures: [Option<TextureId>; 2],
     }
     let response = ui.allocate_rect(area, Sense::click_and_drag());
     let painter = ui.painter().clone();
-    painter.rect_filled(area, 0.0, Color32::from_gray(24));
     let whole = state.size();
-    let whole = vec2(whole.width as f32, whole.height as f32) / scale;
     // As large as it is, or as there is room for.
-    let fits = (area.width() / whole.x).min(area.height() / whole.y).min(1.0);
-    let place = Rect::from_center_size(area.center(), whole * fits);
-    let place = place.translate((place.min.to_vec2() * scale).round() / scale - place.min.to_vec2());
-    let all = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    if let (Some(texture), Some(_)) = (textures[0], &state.pictures[0]) {
-        painter.image(texture, place, all, Color32::WHITE);
-    }
+    let fits = (f64::from(window.width) / f64::from(whole.width))
+        .min(f64::from(window.height) / f64::from(whole.height))
+        .min(1.0);
+    let side = |side: u32| ((f64::from(side) * fits).round() as u32).max(1);
+    let size = [side(whole.width), side(whole.height)];
+    let at = [(window.width as i32 - size[0] as i32) / 2, (window.height as i32 - size[1] as i32) / 2];
+    let points = |[x, y]: [i32; 2]| area.min + vec2(x as f32, y as f32) / scale;
+    let place = Rect::from_min_max(points(at), points([at[0] + size[0] as i32, at[1] + size[1] as i32]));
+    let placed = |picture: &Picture, columns| Placed { image: picture.image.clone(), at, size, columns };
+    session.placed.clear();
+    session.placed.extend(state.pictures[0].as_ref().map(|picture| placed(picture, [0, i32::MAX])));
     if state.beside.is_some() {
-        wipe(ui, session, textures[1], place);
+        let line = at[0] + (state.wipe * size[0] as f32).round() as i32;
+        session.placed.extend(state.pictures[1].as_ref().map(|picture| placed(picture, [line, i32::MAX])));
+        wipe(ui, session, place);
     }
     let state = &mut session.state;
     if session.pixel.is_open {
@@ -130,7 +136,7 @@ fn picture(ui: &mut Ui, session: &mut Session, textures: [Option<TextureId>; 2],
 }
 
 /// What is beside the picture, to the right of a line that can be moved.
-fn wipe(ui: &mut Ui, session: &mut Session, texture: Option<TextureId>, place: Rect) {
+fn wipe(ui: &mut Ui, session: &mut Session, place: Rect) {
     let state = &mut session.state;
     let x = place.left() + state.wipe * place.width();
     let line = Rect::from_center_size(pos2(x, place.center().y), vec2(12.0, place.height()));
@@ -142,11 +148,6 @@ fn wipe(ui: &mut Ui, session: &mut Session, texture: Option<TextureId>, place: R
         ui.ctx().set_cursor_icon(CursorIcon::ResizeHorizontal);
     }
     let painter = ui.painter();
-    let all = Rect::from_min_max(pos2(0.0, 0.0), pos2(1.0, 1.0));
-    let right = Rect::from_min_max(pos2(x, place.top()), place.max);
-    if let (Some(texture), Some(_)) = (texture, &state.pictures[1]) {
-        painter.with_clip_rect(right).image(texture, place, all, Color32::WHITE);
-    }
     painter.vline(x, place.y_range(), Stroke::new(1.5, Color32::WHITE));
     painter.circle_filled(pos2(x, place.center().y), 6.0, Color32::WHITE);
     let Some(beside) = &state.beside else { return };
