@@ -159,7 +159,7 @@ float WeightOfSurface(float pdf, float other)
 
 void main()
 {
-    ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(0, firstRow);
+    ivec2 place = ivec2(gl_GlobalInvocationID.xy) + ivec2(firstColumn, firstRow);
     if (any(greaterThanEqual(place, imageSize(mean)))) return;
     Sequence sequence = Sequence(0, Pcg3d(uvec3(place, frame.seed) + uvec3(0, 0, sampleIndex * GOLDEN_STEP)).x);
     vec3 sum = vec3(0.0);

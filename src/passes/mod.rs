@@ -47,7 +47,7 @@ use path::{Path, PathTargets};
 use resources::Resources;
 use sampling::Round;
 use single::Single;
-use slices::AfterRows;
+use slices::{AfterSlice, Place};
 use tree::{Tree, TreeTargets};
 
 pub use aov::Aovs;
@@ -191,22 +191,23 @@ impl Renderer {
         if picture.is_enough {
             return Ok(Step::Whole);
         }
-        let Some((round, first_row)) = picture.under_way.take().or_else(|| Some((picture.rounds.next()?, 0))) else {
+        let next = |rounds: &mut dyn Iterator<Item = Round>| Some((rounds.next()?, Place::default()));
+        let Some((round, begun)) = picture.under_way.take().or_else(|| next(&mut picture.rounds)) else {
             picture.is_enough = true;
             return Ok(Step::Whole);
         };
         let (commands, resources, targets) = (&mut self.commands, &self.resources, &picture.targets);
         let height = targets.mean.height();
-        let mut rows = if picture.plan.model.traces() { first_row } else { height };
-        let mut after = |_: &mut Commands, done| {
-            rows = done;
-            Ok(if done < height && !goes_on() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
+        let mut place = if picture.plan.model.traces() { begun } else { Place { row: height, column: 0 } };
+        let mut after = |_: &mut Commands, done: Place| {
+            place = done;
+            Ok(if done.row < height && !goes_on() { ControlFlow::Break(()) } else { ControlFlow::Continue(()) })
         };
-        let push = SamplePush { first_row, ..round.push };
+        let push = SamplePush { first_row: begun.row, first_column: begun.column, ..round.push };
         let times = self.passes.sample(commands, resources, targets, &resources.draws, push, &mut after)?;
         picture.times.add(times);
-        if rows < height {
-            picture.under_way = Some((round, rows));
+        if place.row < height {
+            picture.under_way = Some((round, place));
             return Ok(Step::Paused);
         }
         picture.samples += round.samples;
@@ -308,8 +309,8 @@ pub struct Refinement {
     plan: Plan,
     targets: Targets,
     rounds: Box<dyn Iterator<Item = Round> + Send>,
-    /// The round that was left, and how many of its rows are done.
-    under_way: Option<(Round, u32)>,
+    /// The round that was left, and how far it is.
+    under_way: Option<(Round, Place)>,
     start: Instant,
     /// Rounds so far.
     done: u32,
@@ -478,9 +479,9 @@ impl Passes {
             }
             let first_row = if rounds == begun.rounds + 1 { begun.rows } else { 0 };
             let push = SamplePush { first_row, ..round.push };
-            let mut after = |commands: &mut Commands, rows| {
-                if let Some(checkpoint) = checkpoint.as_mut().filter(|checkpoint| checkpoint.is_due()) {
-                    checkpoint.save(commands, &state, Progress::within(rounds, rows, plan.size.height));
+            let mut after = |commands: &mut Commands, Place { row, column }| {
+                if let Some(checkpoint) = checkpoint.as_mut().filter(|checkpoint| column == 0 && checkpoint.is_due()) {
+                    checkpoint.save(commands, &state, Progress::within(rounds, row, plan.size.height));
                 }
                 Ok(ControlFlow::Continue(()))
             };
@@ -506,7 +507,7 @@ impl Passes {
         targets: &Targets,
         draws: &[Draw],
         push: SamplePush,
-        after: &mut AfterRows<'_>,
+        after: &mut AfterSlice<'_>,
     ) -> crate::Result<Vec<PassTime>> {
         match (&mut self.model, &targets.model) {
             (ModelPass::Tree(pass), ModelTargets::Tree(tree)) => pass.sample(commands, targets, tree, push, after),

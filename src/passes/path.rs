@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::resources::Resources;
-use super::slices::{AfterRows, GROUP, Slices};
+use super::slices::{AfterSlice, GROUP, Place, Slices};
 use super::{RADIANCE, Targets};
 use crate::gpu::{
     Bind, BindGroup, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result, SamplePush, Use, shaders,
@@ -51,36 +51,37 @@ impl Path {
         };
         let bytes = size_of::<SamplePush>() as u32;
         let pipeline = ComputePipeline::new(gpu, shader, &targets.group, bytes, &resources.specialization)?;
-        Ok(Self { pipeline, slices: Slices::new() })
+        Ok(Self { pipeline, slices: Slices::new(GROUP) })
     }
 
-    /// One batch of samples of every pixel from row `push.first_row` on, in slices of rows, until `after` says so.
+    /// One batch of samples of every pixel from where `push` says on, in slices, until `after` says so.
     pub(super) fn batch(
         &mut self,
         commands: &mut Commands,
         targets: &Targets,
         path: &PathTargets,
         push: SamplePush,
-        after: &mut AfterRows<'_>,
+        after: &mut AfterSlice<'_>,
     ) -> crate::Result<Vec<PassTime>> {
-        let (width, height) = (targets.mean.width(), targets.mean.height());
+        let size = [targets.mean.width(), targets.mean.height()];
         let mut times = Vec::new();
-        let mut first_row = push.first_row;
-        while first_row < height {
-            let rows = self.slices.next(height - first_row);
+        let mut at = Place { row: push.first_row, column: push.first_column };
+        while at.row < size[1] {
+            let slice = self.slices.next(at, size, push.samples_in_batch);
+            let push = SamplePush { first_row: at.row, first_column: at.column, ..push };
             let start = Instant::now();
             times.extend(commands.run(|cmd| {
                 for image in path.state(&targets.mean) {
                     cmd.use_image(image, Use::Storage);
                 }
                 cmd.timed("path", |cmd| {
-                    let groups = [width.div_ceil(GROUP), rows / GROUP, 1];
-                    cmd.dispatch(&self.pipeline, &path.group, &SamplePush { first_row, ..push }, groups);
+                    let groups = [slice.columns.div_ceil(GROUP), slice.rows / GROUP, 1];
+                    cmd.dispatch(&self.pipeline, &path.group, &push, groups);
                 });
             })?);
-            first_row += rows;
-            self.slices.took(rows, start.elapsed(), height, commands.patience());
-            if after(commands, first_row.min(height))?.is_break() {
+            self.slices.took(&slice, start.elapsed(), commands.patience());
+            at = slice.end(size[0]);
+            if after(commands, at)?.is_break() {
                 break;
             }
         }

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use std::time::Instant;
 
 use super::resources::Resources;
-use super::slices::{AfterRows, GROUP, Slices};
+use super::slices::{AfterSlice, GROUP, Place, Slices};
 use super::{RADIANCE, Targets};
 use crate::gpu::{
     Bind, BindGroup, Buffer, BufferDesc, BufferUse, Commands, ComputePipeline, Gpu, Image, ImageDesc, PassTime, Result,
@@ -34,8 +34,6 @@ pub(super) struct Tree {
     pipeline: ComputePipeline,
     lights: Option<Lights>,
     slices: Slices,
-    /// Pixels of a slice that is as low as it can be.
-    columns: u32,
 }
 
 /// What lights opaque surfaces.
@@ -119,33 +117,35 @@ impl Tree {
                 )?,
             }),
         };
-        Ok(Self { pipeline: pipeline(tree)?, lights, slices: Slices::new(), columns: u32::MAX })
+        Ok(Self { pipeline: pipeline(tree)?, lights, slices: Slices::new(COLUMNS) })
     }
 
-    /// One sample of every pixel from row `push.first_row` on, in slices of rows, until `after` says so; where those leave more points
-    /// than there is room for, in parts of rows.
+    /// One sample of every pixel from where `push` says on, in slices, until `after` says so; slices shrink where they leave more points
+    /// than there is room for.
     pub(super) fn sample(
         &mut self,
         commands: &mut Commands,
         targets: &Targets,
         tree: &TreeTargets,
         push: SamplePush,
-        after: &mut AfterRows<'_>,
+        after: &mut AfterSlice<'_>,
     ) -> crate::Result<Vec<PassTime>> {
-        let (width, height) = (targets.mean.width(), targets.mean.height());
-        let most_rows = (MOST_SAMPLES / width / GROUP).max(1) * GROUP;
+        let size = [targets.mean.width(), targets.mean.height()];
+        // No more pixels than have room to wait.
+        let most_rows = (MOST_SAMPLES / size[0] / GROUP).max(1) * GROUP;
         let mut times = Vec::new();
-        let (mut first_row, mut first_column) = (push.first_row, 0);
-        while first_row < height {
-            let rows = if first_column == 0 { self.slices.next((height - first_row).min(most_rows)) } else { GROUP };
-            let columns = if rows > GROUP { width } else { self.columns.min(width - first_column) };
-            let push = SamplePush { first_row, first_column, ..push };
+        let mut at = Place { row: push.first_row, column: push.first_column };
+        while at.row < size[1] {
+            let slice = self.slices.next(at, [size[0], size[1].min(at.row + most_rows)], 1);
+            let push = SamplePush { first_row: at.row, first_column: at.column, ..push };
+            let (rows, columns) = (slice.rows, slice.columns);
+            let is_least = rows == GROUP && columns <= COLUMNS;
             let start = Instant::now();
             times.extend(commands.run(|cmd| {
                 cmd.use_image(&targets.mean, Use::Storage);
                 cmd.use_image(&tree.counts, Use::Storage);
                 if let Some(lights) = &self.lights {
-                    let header = if columns > COLUMNS { &lights.repeatable } else { &lights.last };
+                    let header = if is_least { &lights.last } else { &lights.repeatable };
                     cmd.copy_buffer(header, &tree.pending.records);
                 }
                 cmd.timed("tree", |cmd| {
@@ -160,21 +160,14 @@ impl Tree {
                     cmd.copy_buffer(&tree.pending.records, &lights.header);
                 }
             })?);
-            if columns > COLUMNS && self.lights.as_ref().is_some_and(Lights::lost_records) {
-                if rows > GROUP {
-                    self.slices.halve(rows);
-                } else {
-                    self.columns = (columns / 2).next_multiple_of(COLUMNS);
-                }
+            if !is_least && self.lights.as_ref().is_some_and(Lights::lost_records) {
+                self.slices.halve(&slice);
                 continue;
             }
-            first_column += columns;
-            if first_column >= width {
-                (first_row, first_column) = (first_row + rows, 0);
-                self.slices.took(rows, start.elapsed(), height, commands.patience());
-                if after(commands, first_row.min(height))?.is_break() {
-                    break;
-                }
+            self.slices.took(&slice, start.elapsed(), commands.patience());
+            at = slice.end(size[0]);
+            if after(commands, at)?.is_break() {
+                break;
             }
         }
         Ok(times)

@@ -19,10 +19,10 @@ use crate::scene::Scene;
 use crate::{Error, Result};
 
 /// What a stand-in may take.
-const STAND_IN: Duration = Duration::from_millis(35);
+const STAND_IN: Duration = Duration::from_millis(22);
 
 /// How coarse stand-ins can be: pixels of the picture in one of theirs, in each direction.
-const COARSE: [f64; 13] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0];
+const COARSE: [f64; 14] = [1.0, 1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 20.0];
 
 /// How much finer each further stand-in is, and how fine none is.
 const FINER: f64 = 2.5;
