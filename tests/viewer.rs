@@ -13,7 +13,7 @@ use vitrum::image::{Stored, decode_stored};
 const SIZE: [u16; 2] = [1280, 720];
 
 /// Where the picture is not covered by panels.
-const CLEAR: [std::ops::Range<usize>; 2] = [310..960, 20..600];
+const CLEAR: [std::ops::Range<usize>; 2] = [270..1010, 20..640];
 
 /// The values of a PNG, as they are stored.
 fn stored(file: &Path) -> Pixels {
@@ -72,18 +72,131 @@ fn sliders_change_the_picture_as_the_options_do() {
     let Some(desktop) = Desktop::open(SIZE, &["--validation", "-v", "--samples", "2"]) else { return };
     shows(&desktop, plain, "the built-in scene");
     // Ends of sliders are exact: what is dragged beyond them stays there.
-    desktop.drag([111, 331], [240, 331]);
+    desktop.drag([109, 213], [240, 213]);
     shows(&desktop, red, "Refl Red");
-    desktop.drag([201, 331], [20, 331]);
+    desktop.drag([183, 213], [20, 213]);
     shows(&desktop, plain, "Refl Red taken back");
-    desktop.drag([160, 80], [60, 80]);
+    desktop.drag([151, 78], [60, 78]);
     shows(&desktop, gone, "Refraction Index of 1");
     desktop.close();
 
     let Some(desktop) = Desktop::open(SIZE, &["--validation", "-v", "--samples", "2"]) else { return };
     shows(&desktop, plain, "the built-in scene");
-    desktop.drag([128, 101], [300, 101]);
+    desktop.drag([127, 99], [300, 99]);
     shows(&desktop, rough, "Roughness");
+    desktop.close();
+}
+
+/// The picture is what the command says that the window has to offer.
+#[test]
+fn the_copied_command_repeats_the_picture() {
+    if Validated::open().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let Some(desktop) = Desktop::open(SIZE, &["--validation", "-v", "--samples", "2"]) else { return };
+    let before = render(folder.path(), "before", "");
+    shows(&desktop, &before, "the built-in scene");
+    // The camera turns and comes closer, the glass changes, and so do the surroundings.
+    desktop.drag([500, 500], [620, 470]);
+    for _ in 0..2 {
+        desktop.event(Desktop::DOWN, 4, [0, 0]);
+        desktop.event(Desktop::UP, 4, [0, 0]);
+    }
+    desktop.drag([151, 78], [190, 78]);
+    desktop.click([1034, 186]);
+    // What unfolds takes its time.
+    std::thread::sleep(Duration::from_millis(500));
+    desktop.drag([1138, 207], [1160, 207]);
+    // File, and its button.
+    std::thread::sleep(Duration::from_millis(500));
+    desktop.click([1036, 349]);
+    std::thread::sleep(Duration::from_millis(500));
+    desktop.click([1130, 426]);
+    std::thread::sleep(Duration::from_millis(500));
+    let command = desktop.clipboard();
+    println!("{command}");
+    for part in ["vitrum render ", "--samples=2", "camera.position=[", "material.glass.ior=", "environment.rotation="] {
+        assert!(command.contains(part), "{part} is not in {command}");
+    }
+    let program = env!("CARGO_BIN_EXE_vitrum");
+    let command = command.replacen("vitrum", program, 1);
+    let status = Command::new("sh").args(["-c", &command]).current_dir(&folder).status().expect("a shell");
+    assert!(status.success(), "{command}");
+    shows(&desktop, &folder.path().join("vitrum.png"), &command);
+    desktop.close();
+}
+
+/// Whatever happens: no message, no crash, and no more memory. `VITRUM_EVENTS` says how many events there are.
+#[test]
+fn random_events_do_no_harm() {
+    if Validated::open().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let file = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).expect("a file");
+        path
+    };
+    let files = [
+        file("good.obj", include_bytes!("../assets/meshes/prism.obj")),
+        file("broken.obj", b"v 0 0 0\nf 1 2 3\n"),
+        file("broken.toml", b"[environment]\ncolour = 1\n"),
+        file("text.txt", b"no scene"),
+        file("broken.png", b"no picture"),
+        folder.path().join("missing.toml"),
+    ];
+    let events: u32 = std::env::var("VITRUM_EVENTS").ok().and_then(|count| count.parse().ok()).unwrap_or(800);
+    let Some(desktop) = Desktop::open(SIZE, &["--validation", "-v", "--samples", "2"]) else { return };
+    std::thread::sleep(Duration::from_secs(3));
+    let mut random = fastrand::Rng::with_seed(11);
+    // In the panels one time of two.
+    let aim = |random: &mut fastrand::Rng| match random.u8(..4) {
+        0 => [random.i16(10..260), random.i16(10..330)],
+        1 => [random.i16(1020..1270), random.i16(10..500)],
+        _ => [random.i16(0..1280), random.i16(0..720)],
+    };
+    let mut memory = Vec::new();
+    for number in 0..events {
+        match random.u32(..100) {
+            0 => desktop.resize([random.u16(1..1400), random.u16(1..900)]),
+            1 => desktop.resize(SIZE),
+            2 => {
+                desktop.show(false);
+                std::thread::sleep(Duration::from_millis(30));
+                desktop.show(true);
+            }
+            3 => desktop.drop_file(&files[random.usize(..files.len())]),
+            4 => {
+                desktop.focus();
+                // W, S, F, Home and digits.
+                let keys = [25, 39, 41, 110, 10, 11];
+                let key = keys[random.usize(..keys.len())];
+                desktop.quick_event(2, key, [0, 0]);
+                desktop.quick_event(3, key, [0, 0]);
+            }
+            5..15 => desktop.quick_event(if random.bool() { Desktop::DOWN } else { Desktop::UP }, 4, [0, 0]),
+            15..55 => {
+                desktop.quick_event(Desktop::MOVE, 0, aim(&mut random));
+                desktop.quick_event(Desktop::DOWN, 1, [0, 0]);
+                desktop.quick_event(Desktop::UP, 1, [0, 0]);
+            }
+            55..80 => {
+                desktop.quick_event(Desktop::MOVE, 0, aim(&mut random));
+                desktop.quick_event(Desktop::DOWN, 1 + random.u8(..3), [0, 0]);
+                desktop.quick_event(Desktop::MOVE, 0, aim(&mut random));
+                for button in 1..4 {
+                    desktop.quick_event(Desktop::UP, button, [0, 0]);
+                }
+            }
+            _ => desktop.quick_event(Desktop::MOVE, 0, aim(&mut random)),
+        }
+        if number % 100 == 99 {
+            memory.push(desktop.memory() >> 20);
+        }
+    }
+    println!("MiB after each 100 events: {memory:?}");
     desktop.close();
 }
 

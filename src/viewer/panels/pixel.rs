@@ -38,6 +38,7 @@ pub(super) fn pixel(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     if !inspection.is_followed {
         ui.small("this model stops sooner; the tree is what there is");
     }
+    ui.spacing_mut().item_spacing.y = 1.0;
     for event in inspection.events.iter().take(MOST_LINES) {
         line(ui, session, event);
     }
@@ -68,7 +69,7 @@ fn line(ui: &mut Ui, session: &Session, event: &Event) {
     let indent = ".".repeat(event.depth.min(12) as usize);
     let text = format!("{indent}{way}{share:.1} % {end}");
     let scene = &session.state.scene;
-    let label = ui.add(egui::Label::new(egui::RichText::new(text).small().color(color)).truncate());
+    let label = ui.add(egui::Label::new(egui::RichText::new(text).size(11.0).color(color)).truncate());
     label.on_hover_ui(|ui| {
         if let Some(object) = event.object.filter(|&object| object < scene.objects.len()) {
             ui.label(name_of(scene, object));

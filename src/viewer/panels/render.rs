@@ -124,6 +124,7 @@ fn effects(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         let called = effect.called_for_by(&state.scene);
         let wish = state.wish(effect);
         ui.horizontal(|ui| {
+            ui.spacing_mut().item_spacing.x = 3.0;
             for (text, value) in [("auto", None), ("on", Some(true)), ("off", Some(false))] {
                 if ui.selectable_label(wish == value, text).clicked() && wish != value {
                     state.set_wish(effect, value);
@@ -138,7 +139,8 @@ fn effects(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
             };
             let lacking = is_on && !effect.honoured_by(model);
             let mark = if lacking { format!("{} !", effect.name()) } else { effect.name().to_owned() };
-            let label = ui.colored_label(color, mark).on_hover_text(why);
+            let label = egui::Label::new(egui::RichText::new(mark).color(color)).truncate();
+            let label = ui.add(label).on_hover_text(why);
             if lacking {
                 label.on_hover_text(format!("model {} does not simulate it", model.name()));
             }
