@@ -127,6 +127,73 @@ fn the_copied_command_repeats_the_picture() {
     desktop.close();
 }
 
+/// Built without debug assertions the viewer cannot be made to lose its device.
+#[test]
+fn a_lost_device_is_replaced_and_one_that_stays_lost_ends_it() {
+    if Validated::open().is_none() || !cfg!(debug_assertions) {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let red = render(folder.path(), "red", "--reflection-red 1");
+    let arguments = ["--validation", "-v", "--samples", "2"];
+    let Some(desktop) = Desktop::open_with(SIZE, &arguments, &[("VITRUM_LOSE_DEVICE", "2x4")]) else { return };
+    std::thread::sleep(Duration::from_secs(3));
+    // What was set before stays, and the panels are where they were.
+    desktop.drag([109, 213], [240, 213]);
+    for step in 0..10 {
+        desktop.event(Desktop::MOVE, 0, [400 + 10 * step, 400]);
+    }
+    shows(&desktop, &red, "after two losses");
+    desktop.close();
+
+    let Some(mut desktop) = Desktop::open_with(SIZE, &[], &[("VITRUM_LOSE_DEVICE", "9x1")]) else { return };
+    let start = Instant::now();
+    let status = loop {
+        if let Some(status) = desktop.viewer.try_wait().expect("a state") {
+            break status;
+        }
+        assert!(start.elapsed() < Duration::from_secs(60), "it goes on");
+        std::thread::sleep(Duration::from_millis(50));
+    };
+    assert_eq!(status.code(), Some(3));
+}
+
+/// A scene that is written anew is shown anew; one that is broken leaves the picture.
+#[test]
+fn a_file_that_changes_is_shown_anew() {
+    if Validated::open().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let scene = folder.path().join("scene.toml");
+    let mesh = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/meshes/prism.obj");
+    let text = |ior: &str| {
+        let [kind, mesh] = ["dielectric".to_owned(), mesh.display().to_string()].map(|text| format!("{text:?}"));
+        format!("[material.glass]\nkind = {kind}\nior = {ior}\n[[object]]\nmesh = {mesh}\nmaterial = \"glass\"\n")
+    };
+    std::fs::write(&scene, text("1.5")).expect("a scene");
+    let name = scene.display().to_string();
+    let first = render(folder.path(), "first", &name);
+    let second = render(folder.path(), "second", &format!("{name} --ior 1.8"));
+    let Some(desktop) = Desktop::open(SIZE, &["--validation", "-v", "--samples", "2", &name]) else { return };
+    shows(&desktop, &first, "the scene");
+    std::fs::write(&scene, text("1.8")).expect("a scene");
+    shows(&desktop, &second, "the scene as it is now");
+    std::fs::write(&scene, text("a lot")).expect("a scene");
+    std::thread::sleep(Duration::from_secs(1));
+    shows(&desktop, &second, "a broken scene");
+    std::fs::write(&scene, text("1.5")).expect("a scene");
+    shows(&desktop, &first, "mended");
+    // Dropped files do the same.
+    desktop.drop_file(&folder.path().join("missing.toml"));
+    std::thread::sleep(Duration::from_secs(1));
+    shows(&desktop, &first, "a file that is not there");
+    let diamond = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/meshes/diamond.obj");
+    desktop.drop_file(&diamond);
+    shows(&desktop, &render(folder.path(), "diamond", &diamond.display().to_string()), "a dropped mesh");
+    desktop.close();
+}
+
 /// Whatever happens: no message, no crash, and no more memory. `VITRUM_EVENTS` says how many events there are.
 #[test]
 fn random_events_do_no_harm() {

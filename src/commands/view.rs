@@ -27,7 +27,7 @@ impl ViewCommand {
             return print(&devices::table(&Instance::new(/* validation: */ false)?.devices()?));
         }
         let messages = viewer::run(Options { scene: self.scene, args: self.options })?;
-        let all = messages.map(|messages| messages.all()).unwrap_or_default();
+        let all: Vec<_> = messages.iter().flat_map(|messages| messages.all()).collect();
         for message in &all {
             talk.detail(message);
         }

@@ -136,6 +136,11 @@ impl Assembly {
         Ok(())
     }
 
+    /// The files that were read so far.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.read.keys().cloned().collect()
+    }
+
     /// The box around an object in the world.
     pub fn bounds_of(&self, object: &Object) -> Bounds {
         Bounds::around_positions(&self.meshes[object.mesh].positions, &object.transform)

@@ -69,6 +69,8 @@ pub struct Scene {
     pub render: RenderArgs,
     /// What was repaired or is worth knowing, one line each.
     pub warnings: Vec<String>,
+    /// The files that it was read from, as far as they are on disk: it is another where one of them changes.
+    pub files: Vec<PathBuf>,
 }
 
 /// A light without extent.
@@ -124,12 +126,14 @@ impl Scene {
         };
         let name = path.display().to_string();
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
-        match extension.as_deref() {
+        let mut scene = match extension.as_deref() {
             Some("toml") => Self::from_file(file::read(Files::Disk, path)?, name, overrides),
             Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path)?, name, overrides),
             _ if path.is_dir() => Err(Error::input(path, 0, "is a folder; name a .toml (scene) or .obj (mesh) in it")),
             _ => Err(Error::input(path, 0, "is no scene of a known kind; known: .toml (scene), .obj (mesh)")),
-        }
+        }?;
+        scene.files.push(path.into());
+        Ok(scene)
     }
 
     fn from_file(file: SceneFile, name: String, overrides: &Overrides) -> Result<Self> {
@@ -142,6 +146,7 @@ impl Scene {
         };
         let framed = camera.is_none();
         let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
+        let mut files = assembly.files();
         let Assembly { meshes, objects, mut materials, textures, mut warnings, .. } = assembly;
         let textures = textures.all;
         warnings.splice(0..0, faults_of_meshes(&objects, &meshes, &materials));
@@ -155,13 +160,31 @@ impl Scene {
             }
         }
         let EnvironmentTable { light, intensity, rotation, visible } = environment;
+        files.extend(textures.iter().map(|texture| texture.path.clone()));
         let light = match overrides.environment.map_or(light, |path| Light::Image(Files::Disk, path)) {
-            Light::Image(files, path) => Surroundings::Image(Panorama::read(files, &path, &mut warnings)?),
+            Light::Image(from, path) => {
+                let panorama = Panorama::read(from, &path, &mut warnings)?;
+                files.push(path);
+                Surroundings::Image(panorama)
+            }
             Light::Color(color) => Surroundings::Color(color),
         };
         let environment = Environment { light, intensity, rotation, visible };
-        let mut scene =
-            Self { name, environment, camera, framed, lights, materials, textures, meshes, objects, render, warnings };
+        files.retain(|file| file.is_file());
+        let mut scene = Self {
+            name,
+            environment,
+            camera,
+            framed,
+            lights,
+            materials,
+            textures,
+            meshes,
+            objects,
+            render,
+            warnings,
+            files,
+        };
         scene.set(&overrides.settings)?;
         Ok(scene)
     }

@@ -60,6 +60,12 @@ fn keep(values: &mut Vec<f64>, value: Duration) {
 }
 
 impl Meter {
+    /// How often the window was drawn.
+    #[cfg(debug_assertions)]
+    pub(super) fn frames(&self) -> u64 {
+        self.frames
+    }
+
     /// The window was drawn, which took so long.
     pub(super) fn drew(&mut self, time: Duration) {
         self.frames += 1;

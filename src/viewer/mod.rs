@@ -5,6 +5,7 @@
 
 mod colors;
 mod desk;
+mod disk;
 mod inspect;
 mod meter;
 mod orbit;
@@ -31,6 +32,7 @@ use crate::image::{ImageFormat, OutputFile};
 use crate::options::RenderArgs;
 use crate::{Error, Result};
 
+use disk::Watch;
 use session::{Action, Session};
 use state::{Edits, State};
 use survey::{Finding, Survey};
@@ -42,8 +44,11 @@ const REST: Duration = Duration::from_millis(120);
 /// While pictures move, the window is drawn with each of them; without one it waits for so long.
 const GAP: Duration = Duration::from_millis(60);
 
-/// How often the viewer looks whether a file is written.
+/// How often the viewer looks whether a file is written, and how long one has to be left alone to be read again.
 const LOOK: Duration = Duration::from_millis(200);
+
+/// Devices that may be lost within a minute.
+const MOST_LOSSES: usize = 3;
 
 /// What a viewer is started with.
 pub struct Options {
@@ -54,13 +59,14 @@ pub struct Options {
 }
 
 /// Opens the window and runs until it is closed. Messages of the validation layer come back.
-pub fn run(options: Options) -> Result<Option<Arc<Messages>>> {
+pub fn run(options: Options) -> Result<Vec<Arc<Messages>>> {
     let none = |error: winit::error::EventLoopError| GpuError::NoWindow(error.to_string());
     let event_loop = EventLoop::<()>::with_user_event().build().map_err(none)?;
     event_loop.set_control_flow(ControlFlow::Wait);
     let session = Session::new(State::new(options)?);
     let proxy = event_loop.create_proxy();
-    let mut app = App { session, shown: None, proxy, closes: false, end: Ok(()), messages: None };
+    let (messages, losses) = (Vec::new(), Vec::new());
+    let mut app = App { session, shown: None, proxy, closes: false, end: Ok(()), messages, losses };
     event_loop.run_app(&mut app).map_err(none)?;
     let App { end, messages, shown, session, .. } = app;
     drop(shown);
@@ -88,6 +94,10 @@ struct Shown {
     next: Option<Instant>,
     /// A render of the picture into a file.
     saving: Option<Child>,
+    /// An eye on the scene's files.
+    watch: Option<Watch>,
+    /// When one of them changed.
+    touched: Option<Instant>,
     window: Arc<Window>,
 }
 
@@ -99,18 +109,43 @@ struct App {
     closes: bool,
     /// How it ended.
     end: Result<()>,
-    messages: Option<Arc<Messages>>,
+    /// Those of each instance.
+    messages: Vec<Arc<Messages>>,
+    /// When devices were lost.
+    losses: Vec<Instant>,
 }
 
 impl App {
     fn open(&mut self, event_loop: &ActiveEventLoop) -> Result<Shown> {
-        let state = &self.session.state;
         let attributes = Window::default_attributes().with_inner_size(LogicalSize::new(1280.0, 720.0));
         let window = event_loop.create_window(attributes).map_err(|error| GpuError::NoWindow(error.to_string()))?;
-        let window = Arc::new(window);
+        self.open_in(Arc::new(window))
+    }
+
+    /// After a device was lost: everything on it anew, in the same window. One that is lost again and again is given up.
+    fn recover(&mut self) -> Result<()> {
+        self.losses.retain(|loss| loss.elapsed() < Duration::from_secs(60));
+        let Some(before) = self.shown.take().filter(|_| self.losses.len() < MOST_LOSSES) else {
+            return Err(Error::Gpu(GpuError::Lost));
+        };
+        self.losses.push(Instant::now());
+        let memory = before.egui.egui_ctx().memory(Clone::clone);
+        let window = before.window.clone();
+        (self.session.state.pictures, self.session.placed) = ([None, None], Vec::new());
+        drop(before);
+        self.session.forget();
+        let shown = self.open_in(window)?;
+        shown.egui.egui_ctx().memory_mut(|all| *all = memory);
+        self.session.state.notice = Some("the device was lost, and is there again".into());
+        self.shown = Some(shown);
+        Ok(())
+    }
+
+    fn open_in(&mut self, window: Arc<Window>) -> Result<Shown> {
+        let state = &self.session.state;
         let validation = state.args.validation == Some(true);
         let instance = Instance::for_windows(validation, &*window)?;
-        self.messages = validation.then(|| instance.messages());
+        self.messages.extend(validation.then(|| instance.messages()));
         let surface = Surface::new(&instance, &window)?;
         let gpu = Gpu::open(&instance, instance.choose(state.args.device.as_deref())?)?;
         let screen = Screen::new(&gpu, surface)?;
@@ -140,6 +175,8 @@ impl App {
             drawn: now,
             next: None,
             saving: None,
+            watch: None,
+            touched: None,
             window,
         })
     }
@@ -148,6 +185,10 @@ impl App {
     fn frame(&mut self) -> Result<()> {
         let Some(shown) = &mut self.shown else { return Ok(()) };
         let session = &mut self.session;
+        #[cfg(debug_assertions)]
+        if is_lost_for_a_test(session.state.meter.frames(), self.losses.len()) {
+            return Err(Error::Gpu(GpuError::Lost));
+        }
         let start = Instant::now();
         let heard = shown.heard.take().unwrap_or(start);
         let timed = shown.hear(session)?;
@@ -161,6 +202,7 @@ impl App {
         if edits.any() {
             (session.state.error, session.state.notice) = (None, None);
         }
+        shown.look_at_files(session, &self.proxy);
         shown.act(session, &mut edits);
         shown.egui.handle_platform_output(&shown.window, output.platform_output);
         shown.screen.set_textures(output.textures_delta)?;
@@ -187,7 +229,9 @@ impl App {
         let repaint = delay.and_then(|delay| Instant::now().checked_add(delay));
         let gap = waits.then(|| shown.drawn + GAP);
         let saved = shown.saving.is_some().then(|| Instant::now() + LOOK);
-        shown.next = [repaint, gap, saved, shown.changed.map(|changed| changed + REST)].into_iter().flatten().min();
+        let touched = shown.touched.map(|touched| touched + LOOK);
+        shown.next =
+            [repaint, gap, saved, touched, shown.changed.map(|changed| changed + REST)].into_iter().flatten().min();
         Ok(())
     }
 }
@@ -238,6 +282,25 @@ impl Shown {
         Ok(timed)
     }
 
+    /// Reads the scene again where one of its files changed, once whoever writes it is done.
+    fn look_at_files(&mut self, session: &mut Session, proxy: &EventLoopProxy<()>) {
+        let files = &session.state.scene.files;
+        if !self.watch.as_ref().is_some_and(|watch| watch.is_of(files)) {
+            let proxy = proxy.clone();
+            let wake = move || {
+                let _ = proxy.send_event(());
+            };
+            self.watch = Some(Watch::new(files, wake));
+        }
+        if self.watch.as_ref().is_some_and(Watch::take) {
+            self.touched = Some(Instant::now());
+        }
+        if self.touched.is_some_and(|touched| touched.elapsed() >= LOOK) {
+            self.touched = None;
+            session.actions.push(Action::Reload);
+        }
+    }
+
     /// Does what the panels asked for.
     fn act(&mut self, session: &mut Session, edits: &mut Edits) {
         for action in std::mem::take(&mut session.actions) {
@@ -250,7 +313,7 @@ impl Shown {
                         _ => {
                             let opened = state.open(path.clone());
                             if opened {
-                                state.remember(&path);
+                                session.recent.add(&path);
                             }
                             opened
                         }
@@ -300,6 +363,15 @@ impl Shown {
     }
 }
 
+/// Whether a test wants a device to be lost now: after so many frames, so often.
+#[cfg(debug_assertions)]
+fn is_lost_for_a_test(frames: u64, losses: usize) -> bool {
+    let wish = std::env::var("VITRUM_LOSE_DEVICE").unwrap_or_default();
+    let (often, after) = wish.split_once('x').unwrap_or_default();
+    let number = |text: &str| text.parse::<u64>().unwrap_or(0);
+    losses < number(often) as usize && frames >= number(after) * (losses as u64 + 1)
+}
+
 /// Starts the render that the command names, which leaves the picture in its file.
 fn save(state: &State) -> Result<Child> {
     ImageFormat::of(state.output.as_ref())?;
@@ -331,7 +403,11 @@ impl ApplicationHandler for App {
 
     fn window_event(&mut self, event_loop: &ActiveEventLoop, _: WindowId, event: WindowEvent) {
         if event == WindowEvent::RedrawRequested {
-            if let Err(error) = self.frame() {
+            let drawn = match self.frame() {
+                Err(Error::Gpu(GpuError::Lost)) => self.recover(),
+                other => other,
+            };
+            if let Err(error) = drawn {
                 self.end = Err(error);
                 event_loop.exit();
             }

@@ -4,6 +4,7 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::disk::Recent;
 use super::inspect::Inspection;
 use super::state::State;
 use super::survey::{Measured, Query};
@@ -89,6 +90,8 @@ pub(super) struct Session {
     pub(super) cost: Cost,
     pub(super) pixel: Pixel,
     pub(super) actions: Vec<Action>,
+    /// Files that were open last.
+    pub(super) recent: Recent,
     /// The pictures in their places, of this frame.
     pub(super) placed: Vec<Placed>,
     /// What the survey was asked last.
@@ -98,7 +101,7 @@ pub(super) struct Session {
 impl Session {
     pub(super) fn new(state: State) -> Self {
         let (cost, pixel) = (Cost::default(), Pixel::default());
-        Self { state, cost, pixel, actions: Vec::new(), placed: Vec::new(), asked: None }
+        Self { state, cost, pixel, actions: Vec::new(), recent: Recent::load(), placed: Vec::new(), asked: None }
     }
 
     /// What is to be measured of what is at rest, if that is not under way already.

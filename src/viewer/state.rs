@@ -1,6 +1,6 @@
 //! What the viewer looks at, and how. In flow files and edits, out flow pictures to be wanted and the command that repeats one.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::time::Instant;
 
 use super::Options;
@@ -100,7 +100,6 @@ pub(super) struct State {
     pub(super) meter: Meter,
     /// Where a picture is saved to.
     pub(super) output: String,
-    pub(super) recent: Vec<PathBuf>,
 }
 
 impl State {
@@ -126,7 +125,6 @@ impl State {
             revision: 0,
             meter: Meter::default(),
             output: "vitrum.png".into(),
-            recent: Vec::new(),
         })
     }
 
@@ -162,7 +160,6 @@ impl State {
                     pictures: std::mem::take(&mut self.pictures),
                     meter: std::mem::take(&mut self.meter),
                     output: std::mem::take(&mut self.output),
-                    recent: std::mem::take(&mut self.recent),
                     revision: self.revision,
                     wipe: self.wipe,
                     ..new
@@ -272,14 +269,6 @@ impl State {
         let words = ["vitrum".to_owned(), "render".to_owned()].into_iter().chain(self.options());
         let words = words.chain(["-o".to_owned(), self.output.clone()]);
         words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" ")
-    }
-
-    /// Puts a file in front of those that were open last.
-    pub(super) fn remember(&mut self, path: &Path) {
-        let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
-        self.recent.retain(|other| *other != path);
-        self.recent.insert(0, path);
-        self.recent.truncate(10);
     }
 }
 

@@ -34,6 +34,11 @@ pub type Pixels = Vec<[u8; 3]>;
 impl Desktop {
     /// `None` where there is no Xvfb; `ci/setup.sh` installs it.
     pub fn open(size: [u16; 2], args: &[&str]) -> Option<Self> {
+        Self::open_with(size, args, &[])
+    }
+
+    /// With variables of the environment.
+    pub fn open_with(size: [u16; 2], args: &[&str], variables: &[(&str, &str)]) -> Option<Self> {
         let screen = format!("{}x{}x24", size[0], size[1]);
         let server = Command::new("Xvfb")
             .args(["-displayfd", "1", "-nolisten", "tcp", "-screen", "0", &screen])
@@ -54,7 +59,9 @@ impl Desktop {
             .current_dir(folder.path())
             .args(args)
             .env("DISPLAY", &display)
+            .env("XDG_CONFIG_HOME", folder.path())
             .env_remove("WAYLAND_DISPLAY")
+            .envs(variables.iter().copied())
             .stderr(Stdio::piped())
             .spawn()
             .expect("the viewer");

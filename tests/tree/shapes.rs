@@ -71,6 +71,7 @@ pub fn scene(parts: impl IntoIterator<Item = Part>) -> Scene {
         objects: Vec::new(),
         render: RenderArgs::default(),
         warnings: Vec::new(),
+        files: Vec::new(),
     };
     for (number, Part { mesh, surface, transform, smooth }) in parts.into_iter().enumerate() {
         scene.meshes.push(mesh.into());

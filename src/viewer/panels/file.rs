@@ -25,9 +25,9 @@ pub(super) fn file(ui: &mut Ui, session: &mut Session) {
         }
         ui.add(TextEdit::singleline(&mut state.output).desired_width(150.0).hint_text("picture.png or .exr"));
     });
-    if !state.recent.is_empty() {
+    if !session.recent.files.is_empty() {
         ui.collapsing("Recent", |ui| {
-            for path in &state.recent {
+            for path in &session.recent.files {
                 let name = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
                 if ui.link(name).on_hover_text(path.display().to_string()).clicked() {
                     session.actions.push(Action::Open(path.clone()));
