@@ -150,7 +150,11 @@ impl App {
         let gpu = Gpu::open(&instance, instance.choose(state.args.device.as_deref())?)?;
         let screen = Screen::new(&gpu, surface)?;
         let context = egui::Context::default();
-        context.all_styles_mut(|style| style.visuals.window_shadow = egui::Shadow::NONE);
+        context.all_styles_mut(|style| {
+            // Wide soft shadows cost more than all else that is drawn.
+            style.visuals.window_shadow = egui::Shadow::NONE;
+            style.text_styles.insert(egui::TextStyle::Small, egui::FontId::proportional(11.0));
+        });
         let scale = Some(window.scale_factor() as f32);
         let side = Some(gpu.max_image_side() as usize);
         let egui = egui_winit::State::new(context, egui::ViewportId::ROOT, &*window, scale, window.theme(), side);

@@ -1,7 +1,7 @@
 //! What the picture costs and how far off it is, what else there is, and what chooses by that.
 
 use egui::{Color32, Slider, Ui};
-use egui_plot::{Legend, Line, MarkerShape, Plot, PlotPoints, Points};
+use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoints, Points, uniform_grid_spacer};
 
 use super::super::session::{Session, Target};
 use super::super::state::Edits;
@@ -26,7 +26,7 @@ pub(super) fn cost(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     error(ui, session);
     ui.separator();
     targets(ui, session, edits);
-    offers(ui, session, edits);
+    offers(ui, session);
 }
 
 /// Milliseconds a sample, now and before.
@@ -108,7 +108,7 @@ fn targets(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
 }
 
 /// Error against time, of all models.
-fn offers(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
+fn offers(ui: &mut Ui, session: &Session) {
     let revision = session.state.revision;
     let Some((of, offers)) = &session.cost.offers else {
         ui.small("measuring what the models have to offer ...");
@@ -119,8 +119,13 @@ fn offers(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     }
     let log = |[ms, error]: [f64; 2]| [ms.max(1e-3).log10(), error.max(1e-9).log10()];
     let decade = |mark: egui_plot::GridMark, _: &_| format!("1e{:.0}", mark.value);
-    let plot = Plot::new("offers").height(170.0).x_axis_label("ms").y_axis_label("error").legend(Legend::default());
+    let plot = Plot::new("offers")
+        .height(170.0)
+        .x_axis_label("ms")
+        .y_axis_label("error")
+        .legend(Legend::default().position(Corner::LeftBottom));
     let plot = plot.x_axis_formatter(decade).y_axis_formatter(decade).show_x(false).show_y(false);
+    let plot = plot.x_grid_spacer(uniform_grid_spacer(|_| [1.0, 1.0, 1.0]));
     let plot = plot.allow_scroll(false).allow_drag(false).allow_zoom(false);
     let here = session.cost.error.filter(|(of, _)| *of == revision).map(|(_, measured)| measured.error);
     let picture = session.state.pictures[0].as_ref();
@@ -138,5 +143,4 @@ fn offers(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
             plot.points(here.shape(MarkerShape::Asterisk).radius(7.0).color(Color32::WHITE));
         }
     });
-    let _ = edits;
 }

@@ -74,7 +74,7 @@ impl<'c> Column<'c> {
         let bottom = self.context.content_rect().bottom() - MARGIN - self.left as f32 * FOLDED;
         let most = (bottom - self.y - FOLDED).max(40.0);
         let window = Window::new(title).fixed_pos(pos2(self.x, self.y)).default_open(open).resizable(false);
-        let window = window.default_size(vec2(WIDTH, most + FOLDED)).max_width(WIDTH);
+        let window = window.auto_sized().max_width(WIDTH);
         let shown = window.show(self.context, |ui| {
             egui::ScrollArea::vertical().max_height(most).auto_shrink([false, true]).show(ui, |ui| {
                 ui.set_width(WIDTH - 24.0);
