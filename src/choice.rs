@@ -318,6 +318,8 @@ impl<'a> Pilots<'a> {
         let mut renderer = Renderer::new(self.gpu, self.scene, plan)?;
         if let Some(interrupt) = &self.interrupt {
             renderer.interrupt_by(interrupt.clone());
+            // Whoever interrupts waits for what is under way.
+            renderer.set_patience(Duration::from_millis(25));
         }
         Ok(renderer)
     }

@@ -66,7 +66,7 @@ struct Changes {
     #[arg(long, value_name = "FILE")]
     env: Option<PathBuf>,
 
-    /// Sets one value of the scene, as its file would: camera.target=[0,1,0], material.glass.ior=1.7, environment.rotation=90; may be repeated
+    /// Sets one value of the scene, as its file would: material.glass.ior=1.7, camera.vertical_fov=20, environment.rotation=90; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
 }

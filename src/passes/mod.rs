@@ -30,7 +30,8 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use crate::gpu::{
-    Bind, BindGroup, Commands, DeviceKind, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Result, SamplePush, Use,
+    Bind, BindGroup, Commands, DeviceKind, Format, Gpu, GpuError, Image, ImageDesc, PassTime, Result, SamplePush,
+    Specialization, Use,
 };
 use crate::options::{Model, Size, Tonemap, Trace};
 use crate::plan::{Budget, Plan};
@@ -131,11 +132,37 @@ pub struct Renderer {
     commands: Commands,
     resources: Resources,
     passes: Passes,
-    model: Model,
-    trace: Option<Trace>,
+    /// Those of other models and effects, the last ones last: what was compiled once need not be again.
+    others: Vec<(Kind, Passes)>,
+    kind: Kind,
     upload: Duration,
     set_up: Duration,
 }
+
+/// What passes are compiled for.
+#[derive(Clone, PartialEq)]
+struct Kind {
+    model: Model,
+    trace: Option<Trace>,
+    specialization: Specialization,
+    opaque: bool,
+    aovs: bool,
+}
+
+impl Kind {
+    fn new(plan: &Plan, trace: Option<Trace>, resources: &Resources) -> Self {
+        Self {
+            model: plan.model,
+            trace,
+            specialization: resources.specialization.clone(),
+            opaque: resources.opaque,
+            aovs: plan.aovs.iter().any(|aov| aov.is_of_surfaces()),
+        }
+    }
+}
+
+/// Passes that are kept beside those in use.
+const MOST_OTHERS: usize = 12;
 
 impl Renderer {
     /// Puts `scene` on the device and makes the passes that `plan` asks for.
@@ -147,7 +174,8 @@ impl Renderer {
         let resources = Resources::new(&mut commands, scene, plan, trace, None)?;
         let upload = start.elapsed();
         let passes = Passes::new(&mut commands, &resources, plan, trace)?;
-        Ok(Self { commands, resources, passes, model: plan.model, trace, upload, set_up: start.elapsed() })
+        let kind = Kind::new(plan, trace, &resources);
+        Ok(Self { commands, resources, passes, others: Vec::new(), kind, upload, set_up: start.elapsed() })
     }
 
     /// From now on nothing is submitted while `interrupt` is set; what is under way ends with [`GpuError::Interrupted`].
@@ -161,13 +189,19 @@ impl Renderer {
         check(&gpu, plan)?;
         let trace = trace_of(&gpu, plan)?;
         let resources = Resources::new(&mut self.commands, scene, plan, trace, Some(&self.resources))?;
-        let same = (plan.model, trace) == (self.model, self.trace)
-            && resources.specialization == self.resources.specialization
-            && resources.opaque == self.resources.opaque;
-        if !same {
-            self.passes = Passes::new(&mut self.commands, &resources, plan, trace)?;
+        let kind = Kind::new(plan, trace, &resources);
+        if kind != self.kind {
+            let passes = match self.others.iter().position(|(other, _)| *other == kind) {
+                Some(place) => self.others.remove(place).1,
+                None => Passes::new(&mut self.commands, &resources, plan, trace)?,
+            };
+            let before = std::mem::replace(&mut self.kind, kind);
+            self.others.push((before, std::mem::replace(&mut self.passes, passes)));
+            if self.others.len() > MOST_OTHERS {
+                self.others.remove(0);
+            }
         }
-        (self.resources, self.model, self.trace) = (resources, plan.model, trace);
+        self.resources = resources;
         Ok(())
     }
 
@@ -261,8 +295,8 @@ impl Renderer {
     /// Renders, as the plan says that this was made for, or that was set since. `progress` hears how many samples are done.
     pub fn render(&mut self, plan: &Plan, progress: &mut dyn FnMut(u32)) -> crate::Result<Rendered> {
         let start = Instant::now();
-        let Self { commands, resources, passes, trace, .. } = self;
-        let (trace, set_up) = (*trace, self.set_up);
+        let Self { commands, resources, passes, kind, .. } = self;
+        let (trace, set_up) = (kind.trace, self.set_up);
         let gpu = commands.gpu().clone();
         let targets = Targets::new(&gpu, plan, resources)?;
         let checkpoint = match &plan.checkpoint {

@@ -92,6 +92,8 @@ struct Shown {
     heard: Option<Instant>,
     drawn: Instant,
     next: Option<Instant>,
+    /// The scene that the title names.
+    named: String,
     /// A render of the picture into a file.
     saving: Option<Child>,
     /// An eye on the scene's files.
@@ -178,6 +180,7 @@ impl App {
             heard: None,
             drawn: now,
             next: None,
+            named: String::new(),
             saving: None,
             watch: None,
             touched: None,
@@ -215,7 +218,7 @@ impl App {
         // What moves is drawn with its next picture.
         let waits = edits.scene && timed.is_none() && start.duration_since(shown.drawn) < GAP;
         if !waits {
-            shown.window.set_title(&format!("{} - Vitrum", session.state.scene.name));
+            shown.name(&session.state.scene.name);
             let primitives = context.tessellate(output.shapes, output.pixels_per_point);
             if shown.screen.draw(&session.placed, output.pixels_per_point, &primitives)? == OnScreen::Not {
                 let size = shown.window.inner_size();
@@ -266,7 +269,7 @@ impl Shown {
                 Finding::Error(revision, measured) => session.cost.error = Some((revision, measured)),
                 Finding::NoError(revision, why) => session.cost.no_error = Some((revision, why)),
                 Finding::Offers(revision, offers) => session.cost.offers = Some((revision, offers)),
-                Finding::Pixel(inspection) => session.pixel.inspection = Some((state.revision, inspection)),
+                Finding::Pixel(revision, inspection) => session.pixel.inspection = Some((revision, inspection)),
                 Finding::Failed(error) => state.error = Some(error),
                 Finding::Lost => return Err(Error::Gpu(GpuError::Lost)),
             }
@@ -284,6 +287,14 @@ impl Shown {
             }
         }
         Ok(timed)
+    }
+
+    /// Puts what is open into the window's title.
+    fn name(&mut self, scene: &str) {
+        if self.named != scene {
+            self.named = scene.to_owned();
+            self.window.set_title(&format!("{scene} - Vitrum"));
+        }
     }
 
     /// Reads the scene again where one of its files changed, once whoever writes it is done.

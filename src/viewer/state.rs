@@ -6,10 +6,10 @@ use std::time::Instant;
 use super::Options;
 use super::meter::Meter;
 use super::worker::{Picture, Shot, Wanted};
+use crate::Result;
 use crate::effects::{Caller, Effect, Selection};
 use crate::options::{Model, ModelChoice, RenderArgs, Size};
 use crate::scene::{Camera, Overrides, Scene};
-use crate::{Error, Result};
 
 /// What was changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -82,6 +82,8 @@ pub(super) struct State {
     pub(super) scene: Scene,
     /// As it was read.
     before: Scene,
+    /// As the viewer was started.
+    given: RenderArgs,
     pub(super) args: RenderArgs,
     /// Whether the size was given; else it is the window's.
     pub(super) sized: bool,
@@ -105,19 +107,23 @@ pub(super) struct State {
 impl State {
     pub(super) fn new(Options { scene: path, args }: Options) -> Result<Self> {
         let scene = Scene::load(path.as_deref(), &Overrides::of(&args))?;
-        let args = args.or(scene.render.clone());
+        let given = args.clone();
+        // Layers and checkpoints are for files.
+        let mut args = RenderArgs { aov: None, checkpoint: None, ..args.or(scene.render.clone()) };
+        let mut notice = None;
         if args.model == Some(ModelChoice::Auto) {
-            let advice = "the viewer needs a model by name; its Cost window chooses one";
-            return Err(Error::Usage(format!("--model auto: {advice}")));
+            args.model = None;
+            notice = Some("model auto: Cost chooses a model by its error or its rate".into());
         }
         Ok(Self {
             path,
             before: scene.clone(),
             scene,
+            given,
             sized: args.size.is_some(),
             args,
             error: None,
-            notice: None,
+            notice,
             pictures: [None, None],
             beside: None,
             wipe: 0.5,
@@ -144,15 +150,16 @@ impl State {
     }
 
     fn replace(&mut self, path: Option<PathBuf>, camera: Option<Camera>) -> bool {
-        let again = path == self.path;
-        let args = match again {
-            true => self.args.clone(),
+        let args = match path == self.path {
+            true => RenderArgs { size: self.args.size.filter(|_| self.sized), ..self.args.clone() },
             // What was said of the scene before does not hold for another.
-            false => RenderArgs { ior: None, roughness: None, env: None, set: None, ..self.args.clone() },
+            false => RenderArgs { ior: None, roughness: None, env: None, set: None, ..self.given.clone() },
         };
-        let size = self.args.size.filter(|_| self.sized);
-        match Self::new(Options { scene: path, args: RenderArgs { size, ..args } }) {
+        match Self::new(Options { scene: path, args }) {
             Ok(mut new) => {
+                if !new.sized {
+                    new.args.size = self.args.size;
+                }
                 if let Some(camera) = camera {
                     (new.scene.camera, new.scene.framed) = (camera, false);
                 }
@@ -161,6 +168,7 @@ impl State {
                     meter: std::mem::take(&mut self.meter),
                     output: std::mem::take(&mut self.output),
                     revision: self.revision,
+                    given: self.given.clone(),
                     wipe: self.wipe,
                     ..new
                 };

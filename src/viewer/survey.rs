@@ -5,6 +5,7 @@ use std::sync::Arc;
 
 use super::desk::{Hand, Orders};
 use super::inspect::{Inspection, Inspector};
+use super::worker::PATIENCE;
 use crate::choice::{Measurements, error_of_most, pilot_size};
 use crate::gpu::{Gpu, GpuError};
 use crate::options::{MOST_SAMPLES, Model, RenderArgs};
@@ -45,7 +46,7 @@ pub(super) enum Finding {
     /// Nothing tells the error: why.
     NoError(u64, String),
     Offers(u64, Arc<Measurements>),
-    Pixel(Box<Inspection>),
+    Pixel(u64, Box<Inspection>),
     Failed(String),
     /// The device is gone.
     Lost,
@@ -110,7 +111,7 @@ impl Work {
                 }
             };
             let inspection = inspector.look(&query.scene, &query.args, pixel)?;
-            self.orders.tell(Finding::Pixel(Box::new(inspection)));
+            self.orders.tell(Finding::Pixel(query.revision, Box::new(inspection)));
         }
         if query.error && !self.orders.is_late() {
             self.error(query, /* to the end: */ !query.offers || self.offered == Some(query.revision))?;
@@ -194,9 +195,11 @@ impl Work {
         let of_shown = Plan::new(scene, &shown)?;
         let mut renderer = Renderer::new(&self.gpu, scene, &of_shown)?;
         renderer.interrupt_by(interrupt.clone());
+        renderer.set_patience(PATIENCE);
         let shown = renderer.render(&of_shown, &mut |_| {})?.radiance;
         let mut renderer = Renderer::new(&self.gpu, scene, &plan)?;
         renderer.interrupt_by(interrupt);
+        renderer.set_patience(PATIENCE);
         let picture = renderer.begin(&plan)?;
         Ok(Some(Reference { revision: query.revision, renderer, picture, plan, shown }))
     }

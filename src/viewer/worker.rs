@@ -35,7 +35,7 @@ const SLOW: f64 = 5e-3;
 const PERIOD: Duration = Duration::from_millis(150);
 
 /// How long a submission should take: whoever moves something waits for its end.
-const PATIENCE: Duration = Duration::from_millis(25);
+pub(super) const PATIENCE: Duration = Duration::from_millis(25);
 
 /// A picture to be made.
 pub(super) struct Shot {
