@@ -296,6 +296,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Option<Vec<String>>,
 
+    /// Leaves the options aside that the scene's [render] table has
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    pub no_render_table: Option<bool>,
+
     /// Exposure of a PNG in stops [default: 0]
     #[arg(long, value_name = "EV", allow_hyphen_values = true, value_parser = range::exposure)]
     pub exposure: Option<f64>,
@@ -350,8 +354,8 @@ impl RenderArgs {
     pub fn names() -> Vec<String> {
         let command = Self::augment_args(clap::Command::new("render"));
         let names = command.get_arguments().filter_map(|argument| argument.get_long().map(str::to_owned));
-        // What it would set stands in the file itself.
-        names.filter(|name| name != "set").collect()
+        // These are about the file itself.
+        names.filter(|name| name != "set" && name != "no-render-table").collect()
     }
 
     /// One option, as it would be given on the command line. An error is one line.
@@ -380,6 +384,7 @@ impl RenderArgs {
             roughness: self.roughness.or(fallback.roughness),
             env: self.env.or(fallback.env),
             set: self.set.or(fallback.set),
+            no_render_table: self.no_render_table.or(fallback.no_render_table),
             exposure: self.exposure.or(fallback.exposure),
             tonemap: self.tonemap.or(fallback.tonemap),
             aov: self.aov.or(fallback.aov),
@@ -431,7 +436,8 @@ impl RenderArgs {
         ];
         let given = given.into_iter().filter_map(|(name, value)| value.map(|value| format!("--{name}={value}")));
         let settings = self.set.iter().flatten().map(|setting| format!("--set={setting}"));
-        given.chain(settings).collect()
+        let alone = (self.no_render_table == Some(true)).then(|| "--no-render-table".to_owned());
+        given.chain(settings).chain(alone).collect()
     }
 }
 

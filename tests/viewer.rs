@@ -116,7 +116,8 @@ fn the_copied_command_repeats_the_picture() {
     std::thread::sleep(Duration::from_millis(500));
     let command = desktop.clipboard();
     println!("{command}");
-    for part in ["vitrum render ", "--samples=2", "camera.position=[", "material.glass.ior=", "environment.rotation="] {
+    for part in ["vitrum render ", "--samples=2", "camera={position=[", "material.glass.ior=", "environment.rotation="]
+    {
         assert!(command.contains(part), "{part} is not in {command}");
     }
     let program = env!("CARGO_BIN_EXE_vitrum");
@@ -264,6 +265,16 @@ fn random_events_do_no_harm() {
         }
     }
     println!("MiB after each 100 events: {memory:?}");
+    // After the first thousand.
+    if memory.len() >= 30 {
+        let median = |values: &[u64]| {
+            let mut values = values.to_vec();
+            values.sort_unstable();
+            values[values.len() / 2]
+        };
+        let (before, after) = memory[10..].split_at((memory.len() - 10) / 2);
+        assert!(median(after) <= median(before) + 16, "{memory:?}");
+    }
     desktop.close();
 }
 

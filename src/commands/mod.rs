@@ -78,6 +78,7 @@ impl Changes {
             roughness: self.roughness,
             environment: self.env.clone(),
             settings: self.set.clone(),
+            no_render_table: false,
         }
     }
 }

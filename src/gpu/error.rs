@@ -136,7 +136,8 @@ pub(super) trait Context<T> {
 impl<T> Context<T> for Result<T, vk::Result> {
     fn context(self, call: &'static str) -> Result<T, GpuError> {
         self.map_err(|result| match result {
-            vk::Result::ERROR_DEVICE_LOST => GpuError::Lost,
+            // A surface that is lost is made anew with all the rest.
+            vk::Result::ERROR_DEVICE_LOST | vk::Result::ERROR_SURFACE_LOST_KHR => GpuError::Lost,
             vk::Result::ERROR_OUT_OF_DEVICE_MEMORY | vk::Result::ERROR_OUT_OF_HOST_MEMORY => {
                 GpuError::OutOfMemory { what: call.into(), state: result.to_string() }
             }

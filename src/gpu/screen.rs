@@ -6,7 +6,7 @@ use std::sync::{Arc, PoisonError};
 
 use ash::{khr, vk};
 use egui_ash_renderer::allocator::DefaultAllocator;
-use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer};
+use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer, RendererError};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
 use winit::window::Window;
 
@@ -75,8 +75,11 @@ pub struct Surface {
     window: Arc<Window>,
 }
 
-fn failed(error: impl std::fmt::Display) -> GpuError {
-    GpuError::Interface(error.to_string())
+fn failed(error: RendererError) -> GpuError {
+    match error {
+        RendererError::Vulkan(vk::Result::ERROR_DEVICE_LOST) => GpuError::Lost,
+        other => GpuError::Interface(other.to_string()),
+    }
 }
 
 impl Surface {
@@ -275,8 +278,9 @@ impl Screen {
             presented
         };
         match presented {
-            Ok(false) => Ok(Shown::Yes),
-            Ok(true) | Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
+            // One that is not the best any more shows all the same; one of another size is made anew by the next frame.
+            Ok(_) => Ok(Shown::Yes),
+            Err(vk::Result::ERROR_OUT_OF_DATE_KHR) => {
                 self.forget();
                 Ok(Shown::Not)
             }

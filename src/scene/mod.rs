@@ -109,6 +109,8 @@ pub struct Overrides {
     pub environment: Option<PathBuf>,
     /// Single values, as [`Scene::set`] takes them; they win over the others.
     pub settings: Vec<String>,
+    /// The scene's own render options count for nothing.
+    pub no_render_table: bool,
 }
 
 impl Scene {
@@ -138,11 +140,12 @@ impl Scene {
 
     fn from_file(file: SceneFile, name: String, overrides: &Overrides) -> Result<Self> {
         let SceneFile { environment, camera, lights, render, assembly } = file;
+        let render = if overrides.no_render_table { RenderArgs::default() } else { render };
         let overrides = Overrides {
             ior: overrides.ior.or(render.ior),
             roughness: overrides.roughness.or(render.roughness),
             environment: overrides.environment.clone().or_else(|| render.env.clone()),
-            settings: overrides.settings.clone(),
+            ..overrides.clone()
         };
         let framed = camera.is_none();
         let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
@@ -171,6 +174,8 @@ impl Scene {
         };
         let environment = Environment { light, intensity, rotation, visible };
         files.retain(|file| file.is_file());
+        files.sort();
+        files.dedup();
         let mut scene = Self {
             name,
             environment,
@@ -275,8 +280,13 @@ fn bare_mesh(path: &Path) -> Result<SceneFile> {
 impl Overrides {
     /// Those among the options of a render.
     pub fn of(args: &RenderArgs) -> Self {
-        let RenderArgs { ior, roughness, env, set, .. } = args;
-        Self { ior: *ior, roughness: *roughness, environment: env.clone(), settings: set.clone().unwrap_or_default() }
+        Self {
+            ior: args.ior,
+            roughness: args.roughness,
+            environment: args.env.clone(),
+            settings: args.set.clone().unwrap_or_default(),
+            no_render_table: args.no_render_table == Some(true),
+        }
     }
 
     fn check(&self) -> Result<()> {

@@ -8,7 +8,7 @@ use toml::de::DeTable;
 
 use super::file::{DIELECTRIC_KEYS, OPAQUE_KEYS, dispersion_of, index_of};
 use super::table::{Document, Entry, FIELD, FINITE, LENGTH, LIGHT, POSITIVE_OR_INFINITE, Table, UNIT};
-use super::{Camera, Dielectric, Dispersion, Environment, Material, Opaque, Scene, Surface};
+use super::{Camera, Dielectric, Dispersion, Environment, GLASSES, Material, Opaque, Scene, Surface};
 use crate::{Error, Result};
 
 /// What is named in front of the first dot.
@@ -66,11 +66,10 @@ impl Scene {
         let mut settings = Vec::new();
         if !self.framed && (before.framed || self.camera != before.camera) {
             let Camera { position, target, up, vertical_fov } = self.camera;
-            settings.extend(
-                [("position", position), ("target", target), ("up", up)]
-                    .map(|(key, value)| format!("camera.{key}={}", triple(value))),
-            );
-            settings.push(format!("camera.vertical_fov={}", number(degrees(vertical_fov))));
+            let [position, target, up] = [position, target, up].map(triple);
+            let fov = number(degrees(vertical_fov));
+            // All at once: one after the other some might not go together with those before.
+            settings.push(format!("camera={{position={position},target={target},up={up},vertical_fov={fov}}}"));
         }
         let (now, then) = (&self.environment, &before.environment);
         let Environment { intensity, rotation, visible, .. } = *now;
@@ -80,8 +79,7 @@ impl Scene {
         settings.extend((visible != then.visible).then(|| format!("environment.visible={visible}")));
         for (i, (now, then)) in self.materials.iter().zip(&before.materials).enumerate() {
             let is_alone = self.materials.iter().filter(|other| other.name == now.name).count() == 1;
-            let is_number = now.name.parse::<usize>().is_ok();
-            let name = if is_alone && !is_number { key(&now.name) } else { i.to_string() };
+            let name = if is_alone { key(&now.name) } else { i.to_string() };
             let changes = match (&now.surface, &then.surface) {
                 (Surface::Dielectric(now), Surface::Dielectric(then)) => changes_of_glass(now, then),
                 (Surface::Opaque(now), Surface::Opaque(then)) => changes_of_opaque(now, then),
@@ -162,13 +160,22 @@ fn changes_of_glass(now: &Dielectric, then: &Dielectric) -> Vec<String> {
             changes.push(format!("{key}={value}"));
         }
     };
-    change("ior", now.ior != then.ior, number(now.ior));
-    change("roughness", now.roughness != then.roughness, number(now.roughness));
     // What a named glass has of its own goes with its index.
     let mut indexed = then.clone();
-    if now.ior != then.ior {
-        indexed.set_ior(now.ior);
+    let is_new = (now.ior, now.dispersion) != (then.ior, then.dispersion);
+    match GLASSES.iter().find(|glass| is_new && (glass.ior, glass.dispersion) == (now.ior, now.dispersion)) {
+        Some(glass) => {
+            (indexed.ior, indexed.dispersion) = (glass.ior, glass.dispersion);
+            change("ior", true, format!("{:?}", glass.name));
+        }
+        None => {
+            if now.ior != then.ior {
+                indexed.set_ior(now.ior);
+            }
+            change("ior", now.ior != then.ior, number(now.ior));
+        }
     }
+    change("roughness", now.roughness != then.roughness, number(now.roughness));
     let dispersion = match now.dispersion {
         Dispersion::Khr(value) => value,
         Dispersion::None | Dispersion::Sellmeier(_) => 0.0,
@@ -203,7 +210,8 @@ fn key(name: &str) -> String {
     let is_bare = |c: char| c.is_ascii_alphanumeric() || c == '_' || c == '-';
     match !name.is_empty() && name.chars().all(is_bare) {
         true => name.to_owned(),
-        false => toml::Value::String(name.to_owned()).to_string(),
+        // With escapes, on one line.
+        false => serde_json::Value::from(name).to_string(),
     }
 }
 
@@ -286,6 +294,30 @@ mod tests {
             assert!(now.settings_since(&again).is_empty(), "{settings:?}");
         }
         assert!(before.settings_since(&before).is_empty());
+    }
+
+    #[test]
+    fn every_named_glass_comes_back_and_materials_whose_names_are_numbers() {
+        let mut before = built_in();
+        let plain = Material { name: "2".into(), surface: Surface::Dielectric(Dielectric::default()) };
+        before.materials = vec![Material { name: "1".into(), ..plain.clone() }, plain.clone(), plain.clone()];
+        before.materials[2].name = "a\nb".into();
+        for from in &GLASSES {
+            for to in &GLASSES {
+                for material in 0..3 {
+                    let (mut then, mut now) = (before.clone(), before.clone());
+                    let put = |scene: &mut Scene, of: &Glass| {
+                        let glass = glass(scene, material);
+                        (glass.ior, glass.dispersion) = (of.ior, of.dispersion);
+                    };
+                    put(&mut then, from);
+                    put(&mut now, to);
+                    let settings = now.settings_since(&then);
+                    then.set(&settings).expect("settings");
+                    assert_eq!(then.materials, now.materials, "{settings:?}");
+                }
+            }
+        }
     }
 
     #[test]

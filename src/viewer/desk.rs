@@ -25,10 +25,16 @@ impl<W, N> Desk<W, N> {
     }
 }
 
+/// What a thread has to say.
+pub(super) trait News {
+    /// Whether nobody needs to hear of `before` any more.
+    fn replaces(&self, before: &Self) -> bool;
+}
+
 /// The thread's side.
 pub(super) struct Orders<W, N>(Arc<Desk<W, N>>);
 
-impl<W, N> Orders<W, N> {
+impl<W, N: News> Orders<W, N> {
     /// Waits for what is wanted; `None` at the end.
     pub(super) fn next(&self) -> Option<W> {
         let mut state = self.0.state();
@@ -64,8 +70,12 @@ impl<W, N> Orders<W, N> {
         self.0.interrupt.clone()
     }
 
+    /// Tells something, in the place of what it makes idle.
     pub(super) fn tell(&self, news: N) {
-        self.0.state().news.push(news);
+        let mut state = self.0.state();
+        state.news.retain(|before| !news.replaces(before));
+        state.news.push(news);
+        drop(state);
         (self.0.wake)();
     }
 }
@@ -101,6 +111,18 @@ impl<W: Send + 'static, N: Send + 'static> Hand<W, N> {
         self.desk.arrived.notify_all();
     }
 
+    /// Ends what is under way; what waits is forgotten.
+    pub(super) fn stop(&self) {
+        let mut state = self.desk.state();
+        state.wanted = None;
+        self.desk.interrupt.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether the thread has ended before its time.
+    pub(super) fn is_over(&self) -> bool {
+        self.thread.as_ref().is_none_or(JoinHandle::is_finished)
+    }
+
     /// What there is to hear since the last time.
     pub(super) fn news(&self) -> Vec<N> {
         std::mem::take(&mut self.desk.state().news)
@@ -124,6 +146,12 @@ mod tests {
     use std::sync::mpsc::channel;
 
     use super::*;
+
+    impl News for (u32, bool) {
+        fn replaces(&self, before: &Self) -> bool {
+            self.0 == before.0
+        }
+    }
 
     #[test]
     fn the_last_order_counts_and_ends_what_is_under_way() {

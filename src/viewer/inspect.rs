@@ -6,6 +6,7 @@
 use glam::DVec3;
 
 use crate::Result;
+use crate::effects::Effect;
 use crate::gpu::Gpu;
 use crate::optics::fresnel::{fresnel_dielectric, refract};
 use crate::optics::medium::{absorption, transmittance};
@@ -43,7 +44,7 @@ pub(super) enum End {
         reflectance: f64,
         refracted: Option<f64>,
     },
-    /// Overlapping bodies of which another one is there.
+    /// A boundary between equal indices, or where another body is.
     Nothing,
     Opaque,
     /// Not followed.
@@ -86,6 +87,8 @@ pub(super) struct Inspection {
 pub(super) struct Inspector {
     probe: TraceProbe,
     ranks: Vec<u32>,
+    /// Whether bodies overlap.
+    nests: bool,
 }
 
 /// A ray on its way, and the bodies around it.
@@ -97,7 +100,8 @@ struct Traveller {
 
 impl Inspector {
     pub(super) fn new(gpu: &Gpu, scene: &Scene) -> Result<Self> {
-        Ok(Self { probe: TraceProbe::new(gpu, scene, Trace::Software)?, ranks: scene.ranks() })
+        let nests = Effect::Nesting.called_for_by(scene);
+        Ok(Self { probe: TraceProbe::new(gpu, scene, Trace::Software)?, ranks: scene.ranks(), nests })
     }
 
     /// The tree behind the centre of `pixel` of a picture of `scene` with `args`.
@@ -167,22 +171,24 @@ impl Inspector {
         ray.event.object = Some(hit.index);
         ray.event.normal = normal;
         ray.event.angle = cos.acos();
-        if let Some(body) = self.medium(scene, &ray.inside) {
-            let per_metre = body.attenuation_color.map(|color| absorption(color, body.attenuation_distance));
-            ray.event.throughput *= per_metre.map(|rate| transmittance(rate, hit.distance));
-        }
         let glass = match &scene.materials[object.material].surface {
             Surface::Opaque(_) => {
+                if let Some(body) = self.medium(scene, &ray.inside) {
+                    let rate = body.attenuation_color.map(|color| absorption(color, body.attenuation_distance));
+                    ray.event.throughput *= rate.map(|rate| transmittance(rate, hit.distance));
+                }
                 ray.event.end = End::Opaque;
                 return Vec::new();
             }
             Surface::Dielectric(glass) => glass,
         };
-        let mut beyond = ray.inside.clone();
-        if hit.behind {
-            beyond.retain(|&body| body != hit.index);
-        } else if !beyond.contains(&hit.index) {
-            beyond.push(hit.index);
+        let (before, beyond) = match glass.thin_walled {
+            true => (ray.inside.clone(), ray.inside.clone()),
+            false => self.boundary(scene, hit, &ray.inside),
+        };
+        if let Some(body) = self.medium(scene, &before) {
+            let per_metre = body.attenuation_color.map(|color| absorption(color, body.attenuation_distance));
+            ray.event.throughput *= per_metre.map(|rate| transmittance(rate, hit.distance));
         }
         let start = |direction: DVec3| {
             hit.position + facing(hit.normal) * (APART * reach).copysign(direction.dot(facing(hit.normal)))
@@ -202,7 +208,10 @@ impl Inspector {
             direction,
             inside: inside.to_vec(),
         };
-        let mirrored = ray.direction + 2.0 * cos * normal;
+        // Interpolated normals may send it below the face.
+        let mirror = |normal: DVec3| ray.direction - 2.0 * ray.direction.dot(normal) * normal;
+        let mirrored = Some(mirror(normal)).filter(|up| up.dot(facing(hit.normal)) > 0.0);
+        let mirrored = mirrored.unwrap_or_else(|| mirror(facing(hit.normal)));
         if glass.thin_walled {
             // Two interfaces, and all that bounces between them.
             let one = fresnel_dielectric(cos, 1.0, glass.ior).reflectance;
@@ -215,18 +224,17 @@ impl Inspector {
             ray.event.end = End::Interface { eta_i: 1.0, eta_t: glass.ior, reflectance, refracted };
             return children;
         }
-        let (before, after) = (self.there(&ray.inside), self.there(&beyond));
-        let index = |body: Option<usize>| body.and_then(|body| glass_of(scene, body)).map_or(1.0, |glass| glass.ior);
-        if before == after {
+        let index = |bodies: &[usize]| self.medium(scene, bodies).map_or(1.0, |glass| glass.ior);
+        let (eta_i, eta_t) = (index(&before), index(&beyond));
+        if eta_i == eta_t {
             let children = vec![child(Way::Through, ray.direction, 1.0, &beyond)];
             ray.event.end = End::Nothing;
             return children;
         }
-        let (eta_i, eta_t) = (index(before), index(after));
         let interface = fresnel_dielectric(cos, eta_i, eta_t);
         let mut children = Vec::new();
         if interface.reflectance > 0.0 {
-            children.push(child(Way::Reflected, mirrored, interface.reflectance, &ray.inside));
+            children.push(child(Way::Reflected, mirrored, interface.reflectance, &before));
         }
         let bent = refract(-ray.direction, normal, eta_i, eta_t).filter(|_| !interface.total);
         if let Some(bent) = bent {
@@ -235,6 +243,34 @@ impl Inspector {
         let refracted = bent.map(|_| interface.cos_theta_t.clamp(0.0, 1.0).acos());
         ray.event.end = End::Interface { eta_i, eta_t, reflectance: interface.reflectance, refracted };
         children
+    }
+
+    /// The bodies on this side and on the other of a boundary: `BoundaryOf()` of `shaders/media.glsl`.
+    fn boundary(&self, scene: &Scene, hit: &Hit, inside: &[usize]) -> (Vec<usize>, Vec<usize>) {
+        let own = hit.index;
+        if !self.nests {
+            return if hit.behind { (vec![own], Vec::new()) } else { (Vec::new(), vec![own]) };
+        }
+        let without = |mut bodies: Vec<usize>| {
+            if let Some(place) = bodies.iter().position(|&body| body == own) {
+                bodies.remove(place);
+            }
+            bodies
+        };
+        let with = |mut bodies: Vec<usize>| {
+            bodies.push(own);
+            bodies
+        };
+        let is_in = inside.contains(&own);
+        let before = match hit.behind {
+            // What is seen from the inside was entered, also where that was missed.
+            true if !is_in => with(inside.to_vec()),
+            // What is seen from the outside was left, unless the mesh holds it twice.
+            false if is_in && !scene.meshes[scene.objects[own].mesh].overlaps => without(inside.to_vec()),
+            _ => inside.to_vec(),
+        };
+        let beyond = if hit.behind { without(before.clone()) } else { with(before.clone()) };
+        (before, beyond)
     }
 
     /// Which of some bodies at one place is there.
@@ -290,4 +326,63 @@ fn in_order(events: Vec<Event>) -> Vec<Event> {
         waiting.extend(&children[number]);
     }
     sorted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::Instance;
+    use crate::scene::{Glass, Overrides};
+
+    /// The events behind some pixels; `None` without a device, on which the other tests insist.
+    fn seen(scene: &Scene) -> Option<Vec<Inspection>> {
+        let instance = Instance::new(/* validation: */ false).ok()?;
+        let gpu = Gpu::open(&instance, instance.choose(None).ok()?).ok()?;
+        let mut inspector = Inspector::new(&gpu, scene).expect("an inspector");
+        let args = RenderArgs { size: Some(Size { width: 12, height: 9 }), ..RenderArgs::default() };
+        let pixels = (0..12).flat_map(|x| (0..9).map(move |y| [x, y]));
+        Some(pixels.map(|pixel| inspector.look(scene, &args, pixel).expect("events")).collect())
+    }
+
+    #[test]
+    fn no_light_is_lost_or_made() {
+        let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        scene.frame(4.0 / 3.0);
+        let Some(all) = seen(&scene) else { return };
+        let mut most = 0;
+        for inspection in &all {
+            most = most.max(inspection.events.len());
+            let is_leaf = |event: &&Event| matches!(event.end, End::Surroundings | End::CutOff);
+            let sum: DVec3 = inspection.events.iter().filter(is_leaf).map(|event| event.throughput).sum();
+            assert!((sum - DVec3::ONE).abs().max_element() < 1e-9, "{:?}: {sum}", inspection.pixel);
+            for (number, event) in inspection.events.iter().enumerate() {
+                assert!(event.parent.is_none_or(|parent| parent < number));
+                let End::Interface { eta_i, eta_t, refracted: Some(bent), .. } = event.end else { continue };
+                assert!((eta_i * event.angle.sin() - eta_t * bent.sin()).abs() < 1e-6, "Snell");
+            }
+        }
+        assert!(most > 20, "{most} events at most");
+    }
+
+    #[test]
+    fn what_is_absorbed_is_missing() {
+        let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
+        let water = Glass::named("water").expect("a glass");
+        for material in &mut scene.materials {
+            let glass =
+                Dielectric { ior: water.ior, attenuation_color: DVec3::new(0.5, 1.0, 1.0), ..Dielectric::default() };
+            material.surface = Surface::Dielectric(Dielectric { attenuation_distance: 0.01, ..glass });
+        }
+        let Some(all) = seen(&scene) else { return };
+        let sums: Vec<DVec3> = all
+            .iter()
+            .map(|inspection| {
+                let leaves =
+                    inspection.events.iter().filter(|event| matches!(event.end, End::Surroundings | End::CutOff));
+                leaves.map(|event| event.throughput).sum()
+            })
+            .collect();
+        assert!(sums.iter().all(|sum| sum.x <= 1.0 + 1e-9 && (sum.y - 1.0).abs() < 1e-9));
+        assert!(sums.iter().any(|sum| sum.x < 0.7));
+    }
 }

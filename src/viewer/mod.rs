@@ -33,7 +33,7 @@ use crate::options::RenderArgs;
 use crate::{Error, Result};
 
 use disk::Watch;
-use session::{Action, Session};
+use session::{Action, Ask, Session};
 use state::{Edits, State};
 use survey::{Finding, Survey};
 use worker::{News, Worker};
@@ -94,8 +94,8 @@ struct Shown {
     next: Option<Instant>,
     /// The scene that the title names.
     named: String,
-    /// A render of the picture into a file.
-    saving: Option<Child>,
+    /// A render of the picture into a file, and that.
+    saving: Option<(Child, String)>,
     /// An eye on the scene's files.
     watch: Option<Watch>,
     /// When one of them changed.
@@ -127,16 +127,17 @@ impl App {
     /// After a device was lost: everything on it anew, in the same window. One that is lost again and again is given up.
     fn recover(&mut self) -> Result<()> {
         self.losses.retain(|loss| loss.elapsed() < Duration::from_secs(60));
-        let Some(before) = self.shown.take().filter(|_| self.losses.len() < MOST_LOSSES) else {
+        let Some(mut before) = self.shown.take().filter(|_| self.losses.len() < MOST_LOSSES) else {
             return Err(Error::Gpu(GpuError::Lost));
         };
         self.losses.push(Instant::now());
         let memory = before.egui.egui_ctx().memory(Clone::clone);
         let window = before.window.clone();
         (self.session.state.pictures, self.session.placed) = ([None, None], Vec::new());
+        let saving = before.saving.take();
         drop(before);
         self.session.forget();
-        let shown = self.open_in(window)?;
+        let shown = Shown { saving, ..self.open_in(window)? };
         shown.egui.egui_ctx().memory_mut(|all| *all = memory);
         self.session.state.notice = Some("the device was lost, and is there again".into());
         self.shown = Some(shown);
@@ -216,7 +217,7 @@ impl App {
         self.closes = context.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Q));
         shown.ask(session, edits, heard);
         // What moves is drawn with its next picture.
-        let waits = edits.scene && timed.is_none() && start.duration_since(shown.drawn) < GAP;
+        let waits = (edits.scene || edits.model) && timed.is_none() && start.duration_since(shown.drawn) < GAP;
         if !waits {
             shown.name(&session.state.scene.name);
             let primitives = context.tessellate(output.shapes, output.pixels_per_point);
@@ -233,7 +234,7 @@ impl App {
             session.state.meter.showed(asked, moving, stand_in);
         }
         let delay = output.viewport_output.values().map(|viewport| viewport.repaint_delay).min();
-        let repaint = delay.and_then(|delay| Instant::now().checked_add(delay));
+        let repaint = delay.filter(|_| !waits).and_then(|delay| Instant::now().checked_add(delay));
         let gap = waits.then(|| shown.drawn + GAP);
         let saved = shown.saving.is_some().then(|| Instant::now() + LOOK);
         let touched = shown.touched.map(|touched| touched + LOOK);
@@ -274,17 +275,22 @@ impl Shown {
                 Finding::Lost => return Err(Error::Gpu(GpuError::Lost)),
             }
         }
-        if let Some(child) = &mut self.saving
+        if let Some((child, _)) = &mut self.saving
             && let Ok(Some(_)) = child.try_wait()
-            && let Some(child) = self.saving.take()
+            && let Some((child, file)) = self.saving.take()
         {
-            let output = child.wait_with_output();
-            let said = output.as_ref().map(|output| String::from_utf8_lossy(&output.stderr).trim().to_owned());
-            match (output.as_ref().is_ok_and(|output| output.status.success()), said) {
-                (true, _) => state.notice = Some(format!("saved {}", state.output)),
-                (false, Ok(said)) => state.error = Some(said),
-                (false, Err(error)) => state.error = Some(format!("cannot save: {error}")),
+            match child.wait_with_output() {
+                Ok(output) if output.status.success() => state.notice = Some(format!("saved {file}")),
+                Ok(output) => {
+                    let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
+                    state.error = Some(if said.is_empty() { format!("{file}: {}", output.status) } else { said });
+                }
+                Err(error) => state.error = Some(format!("{file}: {error}")),
             }
+        }
+        if self.worker.is_over() || self.survey.is_over() {
+            // A thread that panicked; with all the rest it is made anew.
+            return Err(Error::Gpu(GpuError::Lost));
         }
         Ok(timed)
     }
@@ -340,9 +346,10 @@ impl Shown {
                     self.egui.egui_ctx().copy_text(state.command());
                     state.notice = Some("the command is on the clipboard".into());
                 }
+                Action::Save if self.saving.is_some() => state.error = Some("another picture is being saved".into()),
                 Action::Save => match save(state) {
                     Ok(child) => {
-                        self.saving = Some(child);
+                        self.saving = Some((child, state.output.clone()));
                         state.notice = Some(format!("rendering {} ...", state.output));
                     }
                     Err(error) => state.error = Some(error.in_full()),
@@ -355,10 +362,13 @@ impl Shown {
     fn ask(&mut self, session: &mut Session, edits: Edits, heard: Instant) {
         let pixel = session.pixel.pixel.filter(|_| session.pixel.is_open);
         let now = Instant::now();
-        if edits.scene {
+        if edits.scene || edits.model {
             (self.changed, self.asked) = (Some(now), heard);
             session.state.revision += 1;
+            session.state.scene_revision += u64::from(edits.scene);
             session.forget();
+            // What moves has the device for itself.
+            self.survey.stop();
             let wanted = session.state.wanted(heard, /* moving: */ true);
             self.worker.want(wanted);
             return;
@@ -370,10 +380,12 @@ impl Shown {
             self.worker.want(worker::Wanted { pixel, ..wanted });
             self.changed = self.changed.filter(|_| !rests);
         }
-        if self.changed.is_none()
-            && let Some(query) = session.query()
-        {
-            self.survey.want(query);
+        if self.changed.is_none() {
+            match session.query() {
+                Some(Ask::Query(query)) => self.survey.want(*query),
+                Some(Ask::Nothing) => self.survey.stop(),
+                None => {}
+            }
         }
     }
 }
@@ -392,7 +404,8 @@ fn save(state: &State) -> Result<Child> {
     ImageFormat::of(state.output.as_ref())?;
     let program = std::env::current_exe().map_err(|error| Error::file("vitrum", "find", error))?;
     let mut command = Command::new(&program);
-    command.arg("render").args(state.options()).arg("-q").arg("-o").arg(&state.output);
+    command.arg("render").args(state.options()).arg("-q").arg(format!("-o={}", state.output));
+    command.args(state.scene_word());
     command.stdin(Stdio::null()).stdout(Stdio::null()).stderr(Stdio::piped());
     command.spawn().map_err(|error| Error::file(program, "start", error))
 }
@@ -452,7 +465,8 @@ impl ApplicationHandler for App {
     }
 
     fn exiting(&mut self, _: &ActiveEventLoop) {
-        // The worker first, then what is drawn on, then the window.
+        // The threads first, then what is drawn on, then the window; no picture outlives its device.
+        (self.session.state.pictures, self.session.placed) = ([None, None], Vec::new());
         self.shown = None;
     }
 }

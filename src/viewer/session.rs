@@ -15,6 +15,13 @@ use crate::gpu::Placed;
 /// Pictures whose times are plotted.
 const HISTORY: usize = 120;
 
+/// What is to be asked of the survey.
+pub(super) enum Ask {
+    Query(Box<Query>),
+    /// It may rest.
+    Nothing,
+}
+
 /// Something that a panel cannot do itself.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Action {
@@ -48,6 +55,8 @@ pub(super) struct Cost {
     pub(super) tolerance: f64,
     /// Pictures a second.
     pub(super) rate: f64,
+    /// What was chosen by last: the offers' scene, the target and its numbers.
+    pub(super) applied: Option<(u64, Target, f64, f64)>,
 }
 
 impl Default for Cost {
@@ -61,6 +70,7 @@ impl Default for Cost {
             target: Target::None,
             tolerance: crate::choice::TOLERANCE,
             rate: 20.0,
+            applied: None,
         }
     }
 }
@@ -95,7 +105,7 @@ pub(super) struct Session {
     /// The pictures in their places, of this frame.
     pub(super) placed: Vec<Placed>,
     /// What the survey was asked last.
-    asked: Option<(u64, bool, bool, Option<[u32; 2]>)>,
+    asked: Option<(u64, bool, Option<[u32; 2]>)>,
 }
 
 impl Session {
@@ -105,21 +115,30 @@ impl Session {
     }
 
     /// What is to be measured of what is at rest, if that is not under way already.
-    pub(super) fn query(&mut self) -> Option<Query> {
+    pub(super) fn query(&mut self) -> Option<Ask> {
         let pixel = self.pixel.pixel.filter(|_| self.pixel.is_open);
         let known = self.pixel.inspection.as_ref();
         let is_known = known.is_some_and(|(revision, of)| *revision == self.state.revision && Some(of.pixel) == pixel);
         let pixel = pixel.filter(|_| !is_known);
-        let offers = self.cost.is_open;
-        let wish = (self.state.revision, self.cost.is_open, offers, pixel);
-        let has_wishes = self.cost.is_open || pixel.is_some();
-        if self.asked == Some(wish) || !has_wishes {
+        let offers =
+            self.cost.is_open && self.cost.offers.as_ref().is_none_or(|(of, _)| *of != self.state.scene_revision);
+        let wish = (self.state.revision, self.cost.is_open, pixel);
+        if !self.cost.is_open && pixel.is_none() {
+            return self.asked.take().map(|_| Ask::Nothing);
+        }
+        // That a pixel is known now is no reason to begin again.
+        let is_asked = |(revision, error, before): (u64, bool, Option<[u32; 2]>)| {
+            (revision, error) == (wish.0, wish.1) && (pixel.is_none() || before == pixel)
+        };
+        if self.asked.is_some_and(is_asked) {
             return None;
         }
         self.asked = Some(wish);
         let shot = self.state.wanted(std::time::Instant::now(), false).shots.swap_remove(0);
         let (scene, args) = (shot.scene, shot.args);
-        Some(Query { revision: self.state.revision, scene, args, error: self.cost.is_open, offers, pixel })
+        let State { revision, scene_revision, .. } = self.state;
+        let error = self.cost.is_open;
+        Some(Ask::Query(Box::new(Query { revision, scene_revision, scene, args, error, offers, pixel })))
     }
 
     /// Whatever was measured is of something else from now on.

@@ -16,17 +16,20 @@ use crate::scene::{Camera, Overrides, Scene};
 pub(super) struct Edits {
     /// What is rendered.
     pub(super) scene: bool,
+    /// By which model, with how many samples: what models have to offer stays.
+    pub(super) model: bool,
     /// How it is shown: exposure, tone curve, colours that stand for numbers.
     pub(super) look: bool,
 }
 
 impl Edits {
     pub(super) fn any(self) -> bool {
-        self.scene || self.look
+        self.scene || self.model || self.look
     }
 
     pub(super) fn add(&mut self, other: Self) {
         self.scene |= other.scene;
+        self.model |= other.model;
         self.look |= other.look;
     }
 }
@@ -99,6 +102,8 @@ pub(super) struct State {
     pub(super) shows: Shows,
     /// Counts what is looked at: it grows with every change but those of the look.
     pub(super) revision: u64,
+    /// The same without those of the model.
+    pub(super) scene_revision: u64,
     pub(super) meter: Meter,
     /// Where a picture is saved to.
     pub(super) output: String,
@@ -108,13 +113,8 @@ impl State {
     pub(super) fn new(Options { scene: path, args }: Options) -> Result<Self> {
         let scene = Scene::load(path.as_deref(), &Overrides::of(&args))?;
         let given = args.clone();
-        // Layers and checkpoints are for files.
-        let mut args = RenderArgs { aov: None, checkpoint: None, ..args.or(scene.render.clone()) };
-        let mut notice = None;
-        if args.model == Some(ModelChoice::Auto) {
-            args.model = None;
-            notice = Some("model auto: Cost chooses a model by its error or its rate".into());
-        }
+        let (mut args, notice) = Self::of(args.or(scene.render.clone()));
+        args.stats = given.stats.clone();
         Ok(Self {
             path,
             before: scene.clone(),
@@ -129,9 +129,19 @@ impl State {
             wipe: 0.5,
             shows: Shows::default(),
             revision: 0,
+            scene_revision: 0,
             meter: Meter::default(),
             output: "vitrum.png".into(),
         })
+    }
+
+    /// Options as far as they are the viewer's, and what to say of the others.
+    fn of(args: RenderArgs) -> (RenderArgs, Option<String>) {
+        let is_auto = args.model == Some(ModelChoice::Auto);
+        let model = args.model.filter(|_| !is_auto);
+        let notice = is_auto.then(|| "model auto: Cost chooses a model by its error or its rate".into());
+        // Layers and checkpoints are for files.
+        (RenderArgs { model, aov: None, checkpoint: None, ..args }, notice)
     }
 
     pub(super) fn model(&self) -> Model {
@@ -150,13 +160,20 @@ impl State {
     }
 
     fn replace(&mut self, path: Option<PathBuf>, camera: Option<Camera>) -> bool {
-        let args = match path == self.path {
+        let again = path == self.path;
+        let args = match again {
             true => RenderArgs { size: self.args.size.filter(|_| self.sized), ..self.args.clone() },
             // What was said of the scene before does not hold for another.
             false => RenderArgs { ior: None, roughness: None, env: None, set: None, ..self.given.clone() },
         };
         match Self::new(Options { scene: path, args }) {
             Ok(mut new) => {
+                if again && new.scene.render != self.scene.render {
+                    // What it says of itself now counts, and no more what it said.
+                    let args = RenderArgs { stats: None, ..self.given.clone() };
+                    new.args = Self::of(args.or(new.scene.render.clone())).0;
+                }
+                new.sized = self.given.size.or(new.scene.render.size).is_some();
                 if !new.sized {
                     new.args.size = self.args.size;
                 }
@@ -164,10 +181,12 @@ impl State {
                     (new.scene.camera, new.scene.framed) = (camera, false);
                 }
                 *self = Self {
-                    pictures: std::mem::take(&mut self.pictures),
+                    pictures: [self.pictures[0].take(), None],
                     meter: std::mem::take(&mut self.meter),
                     output: std::mem::take(&mut self.output),
                     revision: self.revision,
+                    scene_revision: self.scene_revision,
+                    shows: self.shows,
                     given: self.given.clone(),
                     wipe: self.wipe,
                     ..new
@@ -188,6 +207,7 @@ impl State {
             Ok(scene) => {
                 self.before.environment.light = scene.environment.light.clone();
                 self.scene.environment.light = scene.environment.light;
+                self.scene.files.push(path.clone());
                 self.args.env = Some(path);
                 self.error = None;
                 true
@@ -207,7 +227,12 @@ impl State {
         let size = self.size();
         self.scene.frame(f64::from(size.width) / f64::from(size.height));
         let camera = by(self.scene.camera);
-        if let Ok(camera) = Camera::new(camera.position, camera.target, camera.up, camera.vertical_fov) {
+        // As far as scene files reach.
+        let is_near = |point: glam::DVec3| point.abs().max_element() <= 1e9;
+        if is_near(camera.position)
+            && is_near(camera.target)
+            && let Ok(camera) = Camera::new(camera.position, camera.target, camera.up, camera.vertical_fov)
+        {
             (self.scene.camera, self.scene.framed) = (camera, false);
         }
     }
@@ -263,19 +288,32 @@ impl State {
 
     /// Options of `vitrum render` that repeat the picture.
     pub(super) fn options(&self) -> Vec<String> {
-        let mut words: Vec<String> = self.path.iter().map(|path| path.display().to_string()).collect();
+        let mut words = Vec::new();
         let mut settings = self.args.set.clone().unwrap_or_default();
         settings.extend(self.scene.settings_since(&self.before));
-        let idle = RenderArgs { set: (!settings.is_empty()).then_some(settings), stats: None, ..self.args.clone() };
-        words.extend(idle.words());
+        let set = (!settings.is_empty()).then_some(settings);
+        // The scene's own options are among these, as far as they were not changed.
+        let no_render_table =
+            (self.scene.render != RenderArgs::default()).then_some(true).or(self.args.no_render_table);
+        let args = RenderArgs { set, no_render_table, ..self.args.clone() };
+        words.extend(args.words());
         words.extend(self.args.device.iter().map(|device| format!("--device={device}")));
         words
+    }
+
+    /// The scene as the command names it, last: its name may look like an option.
+    pub(super) fn scene_word(&self) -> Vec<String> {
+        let name = self.path.as_ref().map(|path| path.display().to_string());
+        match name {
+            Some(name) if name.starts_with('-') => vec!["--".into(), name],
+            name => name.into_iter().collect(),
+        }
     }
 
     /// The command that repeats the picture, for a shell.
     pub(super) fn command(&self) -> String {
         let words = ["vitrum".to_owned(), "render".to_owned()].into_iter().chain(self.options());
-        let words = words.chain(["-o".to_owned(), self.output.clone()]);
+        let words = words.chain([format!("-o={}", self.output)]).chain(self.scene_word());
         words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" ")
     }
 }
@@ -311,21 +349,21 @@ mod tests {
     #[test]
     fn the_command_has_what_was_changed() {
         let mut state = State::new(Options { scene: None, args: RenderArgs::default() }).expect("the built-in scene");
-        assert_eq!(state.command(), "vitrum render -o vitrum.png");
+        assert_eq!(state.command(), "vitrum render -o=vitrum.png");
         state.args.size = Some(Size { width: 640, height: 360 });
         state.args.model = Some(Model::Tree.into());
         state.set_wish(Effect::Nesting, Some(false));
         state.set_wish(Effect::Opaque, Some(true));
         assert_eq!(
             state.command(),
-            "vitrum render --model=tree --size=640x360 --effects=auto,opaque,-nesting -o vitrum.png"
+            "vitrum render --model=tree --size=640x360 --effects=auto,opaque,-nesting -o=vitrum.png"
         );
         assert_eq!((state.wish(Effect::Nesting), state.wish(Effect::Opaque)), (Some(false), Some(true)));
         assert_eq!(state.wish(Effect::Shadows), None);
         state.set_wish(Effect::Nesting, None);
         state.set_wish(Effect::Opaque, None);
         state.drag(|camera| Camera { position: camera.position + glam::DVec3::X, ..camera });
-        assert!(state.command().contains(" '--set=camera.position=["), "{}", state.command());
+        assert!(state.command().contains(" '--set=camera={position=["), "{}", state.command());
         assert!(!state.command().contains("effects"), "{}", state.command());
     }
 

@@ -3,7 +3,7 @@
 
 use std::sync::Arc;
 
-use super::desk::{Hand, Orders};
+use super::desk::{Hand, News, Orders};
 use super::inspect::{Inspection, Inspector};
 use super::worker::PATIENCE;
 use crate::choice::{Measurements, error_of_most, pilot_size};
@@ -18,6 +18,8 @@ use crate::{Error, Result};
 pub(super) struct Query {
     /// Tells what is looked at from others.
     pub(super) revision: u64,
+    /// Tells scenes apart, whatever the model.
+    pub(super) scene_revision: u64,
     pub(super) scene: Scene,
     pub(super) args: RenderArgs,
     /// The error of the picture.
@@ -52,11 +54,17 @@ pub(super) enum Finding {
     Lost,
 }
 
+impl News for Finding {
+    fn replaces(&self, before: &Self) -> bool {
+        matches!((self, before), (Self::Error(..), Self::Error(..)) | (Self::Pixel(..), Self::Pixel(..)))
+    }
+}
+
 pub(super) type Survey = Hand<Query, Finding>;
 
 /// Starts the thread; `wake` is called whenever there is news.
 pub(super) fn start(gpu: Gpu, wake: impl Fn() + Send + Sync + 'static) -> Survey {
-    Hand::new(wake, |orders| Work { orders, gpu, offered: None, reference: None, inspector: None }.run())
+    Hand::new(wake, |orders| Work { orders, gpu, reference: None, inspector: None }.run())
 }
 
 /// The reference gets so much better at least before it is held against the picture again.
@@ -81,8 +89,6 @@ struct Reference {
 struct Work {
     orders: Orders<Query, Finding>,
     gpu: Gpu,
-    /// The revision whose offers are known.
-    offered: Option<u64>,
     reference: Option<Reference>,
     inspector: Option<(u64, Inspector)>,
 }
@@ -114,12 +120,11 @@ impl Work {
             self.orders.tell(Finding::Pixel(query.revision, Box::new(inspection)));
         }
         if query.error && !self.orders.is_late() {
-            self.error(query, /* to the end: */ !query.offers || self.offered == Some(query.revision))?;
+            self.error(query, /* to the end: */ !query.offers)?;
         }
-        if query.offers && self.offered != Some(query.revision) && !self.orders.is_late() {
+        if query.offers && !self.orders.is_late() {
             let measured = Measurements::new(&self.gpu, &query.scene, &query.args, self.orders.interrupt())?;
-            self.offered = Some(query.revision);
-            self.orders.tell(Finding::Offers(query.revision, Arc::new(measured)));
+            self.orders.tell(Finding::Offers(query.scene_revision, Arc::new(measured)));
             if query.error && !self.orders.is_late() {
                 self.error(query, true)?;
             }
@@ -155,7 +160,13 @@ impl Work {
             told = samples;
             let truth = reference.renderer.radiance(picture)?;
             let stderr = reference.renderer.counts(picture)?.and_then(|counts| counts.stderr);
-            let noise = stderr.map_or(0.0, |stderr| error_of(MOST_PIXELS, &truth, &stderr));
+            // What cannot tell its own error is as good as it gets when it is whole.
+            let is_unknown = stderr.is_none() && !picture.is_whole();
+            let noise = match stderr {
+                Some(stderr) => error_of(MOST_PIXELS, &truth, &stderr),
+                None if is_unknown => f64::INFINITY,
+                None => 0.0,
+            };
             let error = error_of_most(&reference.shown, &truth);
             let measured = Measured { error, noise, samples, model: reference.plan.model };
             if noise.is_finite() {

@@ -9,7 +9,7 @@ use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use super::colors::{Legend, colors};
-use super::desk::{Hand, Orders};
+use super::desk::{self, Hand, Orders};
 use super::state::Shows;
 use crate::gpu::{Gpu, GpuError, Image, PassTime};
 use crate::options::{RenderArgs, Size};
@@ -76,8 +76,8 @@ pub(super) struct Picture {
     pub(super) lacks: Vec<String>,
     /// What its colours stand for, where they are not those of light.
     pub(super) legend: Option<Legend>,
-    /// Radiance of the pixel that was asked for.
-    pub(super) value: Option<[f32; 3]>,
+    /// The pixel that was asked for, and its radiance.
+    pub(super) value: Option<([u32; 2], [f32; 3])>,
     pub(super) moving: bool,
     /// When it was asked for.
     pub(super) asked: Instant,
@@ -90,6 +90,12 @@ pub(super) enum News {
     Failed(String),
     /// The device is gone.
     Lost,
+}
+
+impl desk::News for News {
+    fn replaces(&self, before: &Self) -> bool {
+        matches!((self, before), (Self::Picture(new), Self::Picture(old)) if new.number == old.number)
+    }
 }
 
 pub(super) type Worker = Hand<Wanted, News>;
@@ -133,13 +139,16 @@ struct Seen {
     image: Image,
     /// What its colours mean, where they are not those of light.
     legend: Option<Legend>,
-    /// Radiance of the pixel that was asked for.
-    value: Option<[f32; 3]>,
+    /// The pixel that was asked for, and its radiance.
+    value: Option<([u32; 2], [f32; 3])>,
 }
 
 fn shown(renderer: &mut Renderer, picture: &mut Refinement, shot: &Shot, pixel: Option<[u32; 2]>) -> Result<Seen> {
     let value = match pixel {
-        Some([x, y]) => renderer.radiance(picture)?.get((y * picture.size().width + x) as usize).copied(),
+        Some([x, y]) => {
+            let radiance = renderer.radiance(picture)?;
+            radiance.get((y * picture.size().width + x) as usize).map(|&radiance| ([x, y], radiance))
+        }
         None => None,
     };
     let RenderArgs { exposure, tonemap, .. } = shot.args;
@@ -188,6 +197,14 @@ impl Work {
 
     fn make(&mut self, wanted: &mut Wanted) -> Result<()> {
         self.slots.resize_with(wanted.shots.len(), Slot::default);
+        // What is beside a picture must not keep it back.
+        if let Err(error) =
+            wanted.shots.iter().skip(1).try_for_each(|shot| Plan::new(&shot.scene, &shot.args).map(drop))
+        {
+            self.orders.tell(News::Failed(format!("beside: {}", error.in_full())));
+            wanted.shots.truncate(1);
+            self.slots.truncate(1);
+        }
         let begun = |slot: &Slot| slot.whole.as_ref().is_some_and(|(revision, ..)| *revision == wanted.revision);
         if !self.slots.iter().all(begun) {
             self.slots.iter_mut().for_each(|slot| slot.whole = None);
@@ -273,13 +290,17 @@ impl Work {
                 self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
             }
             // The same with another look goes on from here.
-            while let Some(next) = self.orders.next_if(|next| next.revision == wanted.revision && !next.moving) {
+            // Of the others it would leave the first as it was.
+            let revision = wanted.revision;
+            let is_like = |next: &Wanted| number == 0 && next.revision == revision && !next.moving;
+            while let Some(next) = self.orders.next_if(is_like) {
                 *wanted = next;
                 shown = None;
             }
             left |= self.orders.is_late();
-            let is_due = shown.is_none_or(|shown| shown.elapsed() > PERIOD);
-            if picture.samples() > 0 && step != Step::Paused && (is_due || picture.is_whole()) {
+            // Another look is shown at once, also of a round that is under way.
+            let is_due = shown.is_none_or(|shown| step != Step::Paused && shown.elapsed() > PERIOD);
+            if picture.samples() > 0 && !left && (is_due || picture.is_whole()) {
                 let asked = wanted.pixel.filter(|[x, y]| number == 0 && *x < plan.size.width && *y < plan.size.height);
                 let seen = self::shown(renderer, &mut picture, &wanted.shots[number], asked)?;
                 shown = Some(Instant::now());

@@ -69,7 +69,6 @@ fn error(ui: &mut Ui, session: &Session) {
 /// A tolerance or a frame rate that chooses the model.
 fn targets(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     let cost = &mut session.cost;
-    let before = (cost.target, cost.tolerance, cost.rate);
     ui.horizontal(|ui| {
         ui.label("Choose by");
         ui.selectable_value(&mut cost.target, Target::None, "hand");
@@ -91,19 +90,21 @@ fn targets(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         Target::Tolerance => Goal { tolerance: Some(cost.tolerance), seconds: None },
         Target::FrameRate => Goal { tolerance: None, seconds: Some(1.0 / cost.rate) },
     };
-    let Some((_, offers)) = &cost.offers else { return };
-    let changed = before != (cost.target, cost.tolerance, cost.rate);
+    let Some((of, offers)) = cost.offers.as_ref().filter(|(of, _)| *of == session.state.scene_revision) else { return };
+    let asked = (*of, cost.target, cost.tolerance, cost.rate);
+    let changed = cost.applied != Some(asked);
     let Some(best) = offers.ranked(goal).into_iter().next() else {
         ui.small("nothing tells how far off a model is");
         return;
     };
     let RenderArgs { model, samples, max_depth, tolerance, .. } = best.args;
     ui.small(format!("{}, {} samples: {:.0} ms, within {:.1e}", best.model.name(), best.samples, best.ms, best.error));
+    session.cost.applied = Some(asked);
     let args = &mut session.state.args;
     let now = (args.model, args.samples, args.max_depth, args.tolerance);
     if changed && now != (model, samples, max_depth, tolerance) {
         (args.model, args.samples, args.max_depth, args.tolerance) = (model, samples, max_depth, tolerance);
-        edits.scene = true;
+        edits.model = true;
     }
 }
 
@@ -114,7 +115,7 @@ fn offers(ui: &mut Ui, session: &Session) {
         ui.small("measuring what the models have to offer ...");
         return;
     };
-    if *of != revision {
+    if *of != session.state.scene_revision {
         ui.small("as it was before the last change");
     }
     let log = |[ms, error]: [f64; 2]| [ms.max(1e-3).log10(), error.max(1e-9).log10()];

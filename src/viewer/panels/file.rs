@@ -15,7 +15,8 @@ pub(super) fn file(ui: &mut Ui, session: &mut Session) {
         if ui.button("Reload").clicked() {
             session.actions.push(Action::Reload);
         }
-        if ui.button("Copy command").on_hover_text(state.command()).clicked() {
+        let button = ui.button("Copy command");
+        if button.on_hover_ui(|ui| drop(ui.label(state.command()))).clicked() {
             session.actions.push(Action::Copy);
         }
     });

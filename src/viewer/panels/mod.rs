@@ -19,6 +19,9 @@ use crate::gpu::Placed;
 use crate::options::Size;
 use crate::scene::{Bounds, Scene};
 
+/// Steps of flight a second.
+const FLIGHT: f64 = 20.0;
+
 /// How wide a column of windows is, and how far from the edge.
 const WIDTH: f32 = 252.0;
 const MARGIN: f32 = 10.0;
@@ -40,13 +43,15 @@ pub(super) fn all(ui: &mut Ui, session: &mut Session) -> Edits {
     right.window("Render", roomy, |ui| render::render(ui, session, &mut edits));
     right.window("File", false, |ui| file::file(ui, session));
     session.cost.is_open = right.window("Cost", false, |ui| cost::cost(ui, session, &mut edits));
+    let was_open = session.pixel.is_open;
     session.pixel.is_open = right.window("Pixel", false, |ui| pixel::pixel(ui, session, &mut edits));
+    edits.look |= session.pixel.is_open && !was_open && session.pixel.pixel.is_some();
     let state = &session.state;
     for (text, color) in [(&state.error, Color32::LIGHT_RED), (&state.notice, Color32::LIGHT_GREEN)] {
         let Some(text) = text else { continue };
         let bar = Window::new(if color == Color32::LIGHT_RED { "Error" } else { "Notice" }).title_bar(false);
         let bar = bar.anchor(Align2::CENTER_BOTTOM, vec2(0.0, -MARGIN)).resizable(false);
-        bar.max_width(area.width() - 2.0 * (WIDTH + 3.0 * MARGIN)).show(&context, |ui| {
+        bar.max_width((area.width() - 2.0 * (WIDTH + 3.0 * MARGIN)).max(200.0)).show(&context, |ui| {
             ui.label(RichText::new(text).color(color));
         });
         break;
@@ -190,7 +195,9 @@ fn camera(ui: &Ui, response: &Response, session: &mut Session, height: f32, edit
     let held = |key| !typing && ui.input(|input| input.key_down(key));
     for (key, steps) in [(Key::W, 1.0), (Key::S, -1.0)] {
         if held(key) {
-            state.drag(|camera| orbit::fly(camera, steps));
+            // As fast whatever the pictures take.
+            let time = f64::from(ui.input(|input| input.stable_dt)).min(0.1);
+            state.drag(|camera| orbit::fly(camera, steps * FLIGHT * time));
             ui.ctx().request_repaint();
             edits.scene = true;
         }

@@ -25,7 +25,8 @@ pub(super) fn pixel(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         }
     });
     let picture = session.state.pictures[0].as_ref();
-    if let Some([r, g, b]) = picture.and_then(|picture| picture.value) {
+    let value = picture.and_then(|picture| picture.value).filter(|(of, _)| *of == [x, y]);
+    if let Some((_, [r, g, b])) = value {
         ui.label(format!("{r:.4}, {g:.4}, {b:.4}")).on_hover_text("linear Rec. 709");
     }
     let Some((of, inspection)) = &session.pixel.inspection else {
@@ -60,7 +61,7 @@ fn line(ui: &mut Ui, session: &Session, event: &Event) {
         End::Surroundings => "surroundings".into(),
         End::CutOff => "not followed".into(),
         End::Opaque => format!("opaque, {angle:.1} deg"),
-        End::Nothing => "another body is there".into(),
+        End::Nothing => "no change of index".into(),
         End::Interface { reflectance, refracted: Some(bent), .. } => {
             format!("{angle:.1} > {:.1} deg, F {reflectance:.3}", bent.to_degrees())
         }

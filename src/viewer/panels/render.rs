@@ -19,7 +19,7 @@ pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
                 if ui.selectable_label(model == now, model.name()).clicked() && model != now {
                     state.args = RenderArgs { tolerance: None, max_depth: None, ..state.args.clone() };
                     state.args.model = Some(model.into());
-                    edits.scene = true;
+                    edits.model = true;
                 }
             }
         });
@@ -28,7 +28,7 @@ pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         let mut samples = state.args.samples.unwrap_or(if now == Model::Path { 256 } else { 16 });
         if ui.add(DragValue::new(&mut samples).range(1..=65536)).changed() {
             state.args.samples = Some(samples);
-            edits.scene = true;
+            edits.model = true;
         }
         ui.end_row();
         if now != Model::Single {
@@ -36,7 +36,7 @@ pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
             let mut depth = state.args.max_depth.unwrap_or(DEPTH);
             if ui.add(DragValue::new(&mut depth).range(1..=1024)).changed() {
                 state.args.max_depth = Some(depth);
-                edits.scene = true;
+                edits.model = true;
             }
             ui.end_row();
         }
