@@ -30,6 +30,8 @@ use winit::window::{Window, WindowId};
 use crate::gpu::{Gpu, GpuError, Instance, Messages, OnScreen, Screen, Surface};
 use crate::image::{ImageFormat, OutputFile};
 use crate::options::RenderArgs;
+use crate::passes;
+use crate::plan::Plan;
 use crate::{Error, Result};
 
 use disk::Watch;
@@ -60,7 +62,12 @@ pub struct Options {
 
 /// Opens the window and runs until it is closed. Messages of the validation layer come back.
 pub fn run(options: Options) -> Result<Vec<Arc<Messages>>> {
-    let none = |error: winit::error::EventLoopError| GpuError::NoWindow(error.to_string());
+    let none = |error: winit::error::EventLoopError| {
+        // Where in a library it was found does not help.
+        let text = error.to_string();
+        let told = text.split_once(".rs:").and_then(|(_, rest)| rest.split_once(": ")).map(|(_, told)| told.to_owned());
+        GpuError::NoWindow(told.unwrap_or(text))
+    };
     let event_loop = EventLoop::<()>::with_user_event().build().map_err(none)?;
     event_loop.set_control_flow(ControlFlow::Wait);
     let session = Session::new(State::new(options)?);
@@ -151,6 +158,9 @@ impl App {
         self.messages.extend(validation.then(|| instance.messages()));
         let surface = Surface::new(&instance, &window)?;
         let gpu = Gpu::open(&instance, instance.choose(state.args.device.as_deref())?)?;
+        if state.sized {
+            passes::check(&gpu, &Plan::new(&state.scene, &state.args)?)?;
+        }
         let screen = Screen::new(&gpu, surface)?;
         let context = egui::Context::default();
         context.all_styles_mut(|style| {
@@ -283,7 +293,9 @@ impl Shown {
                 Ok(output) if output.status.success() => state.notice = Some(format!("saved {file}")),
                 Ok(output) => {
                     let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-                    state.error = Some(if said.is_empty() { format!("{file}: {}", output.status) } else { said });
+                    let said = said.strip_prefix("error: ").unwrap_or(&said);
+                    state.error =
+                        Some(if said.is_empty() { format!("{file}: {}", output.status) } else { said.into() });
                 }
                 Err(error) => state.error = Some(format!("{file}: {error}")),
             }
@@ -374,7 +386,8 @@ impl Shown {
             return;
         }
         let rests = self.changed.is_some_and(|changed| now.duration_since(changed) >= REST);
-        if rests || edits.look {
+        session.state.beside_revision += u64::from(edits.beside);
+        if rests || edits.look || edits.beside {
             let asked = if rests { self.asked } else { heard };
             let wanted = session.state.wanted(asked, /* moving: */ false);
             self.worker.want(worker::Wanted { pixel, ..wanted });

@@ -18,18 +18,21 @@ pub(super) struct Edits {
     pub(super) scene: bool,
     /// By which model, with how many samples: what models have to offer stays.
     pub(super) model: bool,
+    /// What is beside.
+    pub(super) beside: bool,
     /// How it is shown: exposure, tone curve, colours that stand for numbers.
     pub(super) look: bool,
 }
 
 impl Edits {
     pub(super) fn any(self) -> bool {
-        self.scene || self.model || self.look
+        self.scene || self.model || self.beside || self.look
     }
 
     pub(super) fn add(&mut self, other: Self) {
         self.scene |= other.scene;
         self.model |= other.model;
+        self.beside |= other.beside;
         self.look |= other.look;
     }
 }
@@ -104,6 +107,8 @@ pub(super) struct State {
     pub(super) revision: u64,
     /// The same without those of the model.
     pub(super) scene_revision: u64,
+    /// Counts what is beside.
+    pub(super) beside_revision: u64,
     pub(super) meter: Meter,
     /// Where a picture is saved to.
     pub(super) output: String,
@@ -130,6 +135,7 @@ impl State {
             shows: Shows::default(),
             revision: 0,
             scene_revision: 0,
+            beside_revision: 0,
             meter: Meter::default(),
             output: "vitrum.png".into(),
         })
@@ -150,16 +156,15 @@ impl State {
 
     /// Another scene in the place of this one; what cannot be read leaves it, and is said.
     pub(super) fn open(&mut self, path: PathBuf) -> bool {
-        self.replace(Some(path), None)
+        self.replace(Some(path), Vec::new())
     }
 
-    /// The same files again, seen from where the camera is.
+    /// The same files again, with what was changed here.
     pub(super) fn reload(&mut self) -> bool {
-        let camera = (!self.scene.framed && self.scene.camera != self.before.camera).then_some(self.scene.camera);
-        self.replace(self.path.clone(), camera)
+        self.replace(self.path.clone(), self.scene.settings_since(&self.before))
     }
 
-    fn replace(&mut self, path: Option<PathBuf>, camera: Option<Camera>) -> bool {
+    fn replace(&mut self, path: Option<PathBuf>, changes: Vec<String>) -> bool {
         let again = path == self.path;
         let args = match again {
             true => RenderArgs { size: self.args.size.filter(|_| self.sized), ..self.args.clone() },
@@ -177,8 +182,9 @@ impl State {
                 if !new.sized {
                     new.args.size = self.args.size;
                 }
-                if let Some(camera) = camera {
-                    (new.scene.camera, new.scene.framed) = (camera, false);
+                for change in changes {
+                    // What a material was called that is gone has no place any more.
+                    let _ = new.scene.set(&[change]);
                 }
                 *self = Self {
                     pictures: [self.pictures[0].take(), None],
@@ -186,6 +192,7 @@ impl State {
                     output: std::mem::take(&mut self.output),
                     revision: self.revision,
                     scene_revision: self.scene_revision,
+                    beside_revision: self.beside_revision + 1,
                     shows: self.shows,
                     given: self.given.clone(),
                     wipe: self.wipe,
@@ -246,8 +253,12 @@ impl State {
         };
         let scene = framed(self.scene.clone());
         let shows = |model| if self.shows.is_of(model) { self.shows } else { Shows::Light };
-        let mut shots =
-            vec![Shot { scene: scene.clone(), args: self.args.clone(), shows: shows(model_of(&self.args)) }];
+        let mut shots = vec![Shot {
+            revision: [self.revision, 0],
+            scene: scene.clone(),
+            args: self.args.clone(),
+            shows: shows(model_of(&self.args)),
+        }];
         if let Some(beside) = &self.beside {
             let (camera, framed) = (scene.camera, scene.framed);
             let scene = match &beside.scene {
@@ -257,9 +268,9 @@ impl State {
             let look = RenderArgs { exposure: self.args.exposure, tonemap: self.args.tonemap, ..beside.args.clone() };
             let args = RenderArgs { size: self.args.size, ..look };
             let shows = shows(model_of(&args));
-            shots.push(Shot { scene, args, shows });
+            shots.push(Shot { revision: [self.revision, self.beside_revision + 1], scene, args, shows });
         }
-        Wanted { revision: self.revision, shots, pixel: None, moving, asked }
+        Wanted { shots, pixel: None, moving, asked }
     }
 
     /// Whether an effect is on, off, or as the scene calls for it (`None`).
@@ -365,6 +376,35 @@ mod tests {
         state.drag(|camera| Camera { position: camera.position + glam::DVec3::X, ..camera });
         assert!(state.command().contains(" '--set=camera={position=["), "{}", state.command());
         assert!(!state.command().contains("effects"), "{}", state.command());
+    }
+
+    #[test]
+    fn the_command_holds_where_a_scene_has_options_of_its_own() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let path = folder.path().join("scene.toml");
+        let write = |options: &str| std::fs::write(&path, format!("[render]\n{options}\n")).expect("a scene");
+        write(
+            "model = \"tree\"\nmax_depth = 8\ntolerance = 0.01\nroughness = 0.5\naov = [\"discarded\"]\nstats = \"s.json\"",
+        );
+        let options = Options { scene: Some(path.clone()), args: RenderArgs::default() };
+        let mut state = State::new(options).expect("a scene");
+        assert_eq!(state.args.stats, None, "those are of a render");
+        state.args = RenderArgs { tolerance: None, max_depth: None, ..state.args.clone() };
+        state.args.model = Some(Model::Single.into());
+        let name = path.display();
+        let wanted = format!("vitrum render --model=single --roughness=0.5 --no-render-table -o=vitrum.png {name}");
+        assert_eq!(state.command(), wanted);
+        let again = RenderArgs { no_render_table: Some(true), ..RenderArgs::default() };
+        let scene = Scene::load(Some(&path), &Overrides::of(&again)).expect("a scene");
+        assert_eq!(scene.render, RenderArgs::default());
+        // What the file says of itself counts where it changes.
+        write("samples = 3\nmodel = \"auto\"");
+        assert!(state.reload(), "{:?}", state.error);
+        assert_eq!((state.args.samples, state.args.model, state.args.roughness), (Some(3), None, None));
+        // Another scene has its own.
+        assert!(state.open(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/meshes/prism.obj")));
+        assert_eq!(state.args.samples, None);
+        assert!(state.command().starts_with("vitrum render -o=vitrum.png "), "{}", state.command());
     }
 
     #[test]

@@ -10,9 +10,9 @@ use std::time::{Duration, Instant};
 
 use super::colors::{Legend, colors};
 use super::desk::{self, Hand, Orders};
-use super::state::Shows;
+use super::state::{Shows, model_of};
 use crate::gpu::{Gpu, GpuError, Image, PassTime};
-use crate::options::{RenderArgs, Size};
+use crate::options::{Model, RenderArgs, Size};
 use crate::passes::{Refinement, Renderer, Step};
 use crate::plan::{Budget, Plan};
 use crate::scene::Scene;
@@ -39,6 +39,8 @@ pub(super) const PATIENCE: Duration = Duration::from_millis(25);
 
 /// A picture to be made.
 pub(super) struct Shot {
+    /// Tells it from others, but for how they are shown.
+    pub(super) revision: [u64; 2],
     pub(super) scene: Scene,
     /// Model, size, samples and the rest.
     pub(super) args: RenderArgs,
@@ -48,8 +50,6 @@ pub(super) struct Shot {
 
 /// Pictures to be made.
 pub(super) struct Wanted {
-    /// Tells these from others, but for how they are shown.
-    pub(super) revision: u64,
     pub(super) shots: Vec<Shot>,
     /// A pixel of the first whose value is to be known.
     pub(super) pixel: Option<[u32; 2]>,
@@ -167,9 +167,9 @@ fn shown(renderer: &mut Renderer, picture: &mut Refinement, shot: &Shot, pixel: 
 struct Slot {
     renderer: Option<Renderer>,
     /// The revision that a stand-in was of last.
-    stood_in: Option<u64>,
+    stood_in: Option<[u64; 2]>,
     /// The whole one, as far as it is, and the revision that it is of.
-    whole: Option<(u64, Plan, Refinement)>,
+    whole: Option<([u64; 2], Plan, Refinement)>,
 }
 
 /// The thread, seen from itself.
@@ -205,26 +205,39 @@ impl Work {
             wanted.shots.truncate(1);
             self.slots.truncate(1);
         }
-        let begun = |slot: &Slot| slot.whole.as_ref().is_some_and(|(revision, ..)| *revision == wanted.revision);
-        if !self.slots.iter().all(begun) {
-            self.slots.iter_mut().for_each(|slot| slot.whole = None);
-            for number in 0..wanted.shots.len() {
-                let coarse = self.coarse(wanted, number)?;
-                let stood_in = self.slots[number].stood_in == Some(wanted.revision);
-                if wanted.moving || coarse > 1.0 && !stood_in {
-                    self.stand_in(wanted, number, coarse, /* leaves: */ false)?;
-                }
+        let mut new = Vec::new();
+        for (number, (slot, shot)) in self.slots.iter_mut().zip(&wanted.shots).enumerate() {
+            if slot.whole.as_ref().is_none_or(|(revision, ..)| *revision != shot.revision) {
+                slot.whole = None;
+                new.push(number);
             }
-            for number in 0..wanted.shots.len() {
-                // Finer ones, where the first round of the whole picture lets wait.
-                let mut coarse = self.coarse(wanted, number)? / FINER;
-                while !wanted.moving && coarse > FINEST && !self.orders.is_late() {
+        }
+        for &number in &new {
+            let coarse = self.coarse(wanted, number)?;
+            let stood_in = self.slots[number].stood_in == Some(wanted.shots[number].revision);
+            if wanted.moving || coarse > 1.0 && !stood_in {
+                self.stand_in(wanted, number, coarse, /* leaves: */ false)?;
+            }
+        }
+        for &number in &new {
+            // Finer ones, where the first round of the whole picture lets wait: that of `path` has many samples.
+            let paths = model_of(&wanted.shots[number].args) == Model::Path;
+            let mut coarse = self.coarse(wanted, number)?;
+            while !wanted.moving && coarse > 1.0 && !self.orders.is_late() {
+                coarse = (coarse / FINER).max(1.0);
+                if coarse > FINEST || paths {
                     self.stand_in(wanted, number, coarse, /* leaves: */ true)?;
-                    coarse /= FINER;
                 }
             }
         }
-        for number in 0..wanted.shots.len() {
+        // The quicker one first.
+        let mut order: Vec<usize> = (0..wanted.shots.len()).collect();
+        let pixels = |number: &usize| {
+            let model = model_of(&wanted.shots[*number].args);
+            self.speed.get(model.name()).copied().unwrap_or_default().pixels(1.0)
+        };
+        order.sort_by(|a, b| pixels(b).total_cmp(&pixels(a)));
+        for number in order {
             if !wanted.moving && !self.grow(wanted, number)? {
                 return Ok(());
             }
@@ -260,7 +273,7 @@ impl Work {
         }
         let seen = shown(renderer, &mut picture, &wanted.shots[number], None)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        self.slots[number].stood_in = Some(wanted.revision);
+        self.slots[number].stood_in = Some(wanted.shots[number].revision);
         self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
         self.show(wanted, number, &plan, whole, &picture, seen);
         Ok(())
@@ -268,7 +281,7 @@ impl Work {
 
     /// The whole picture, with all its samples, shown from time to time; false where something else was wanted before its end.
     fn grow(&mut self, wanted: &mut Wanted, number: usize) -> Result<bool> {
-        let kept = self.slots[number].whole.take().filter(|(revision, ..)| *revision == wanted.revision);
+        let kept = self.slots[number].whole.take().filter(|(revision, ..)| *revision == wanted.shots[number].revision);
         let (plan, mut picture) = match kept {
             Some((_, plan, picture)) => (plan, picture),
             None => {
@@ -291,8 +304,9 @@ impl Work {
             }
             // The same with another look goes on from here.
             // Of the others it would leave the first as it was.
-            let revision = wanted.revision;
-            let is_like = |next: &Wanted| number == 0 && next.revision == revision && !next.moving;
+            let revisions = |wanted: &Wanted| wanted.shots.iter().map(|shot| shot.revision).collect::<Vec<_>>();
+            let these = revisions(wanted);
+            let is_like = |next: &Wanted| number == 0 && revisions(next) == these && !next.moving;
             while let Some(next) = self.orders.next_if(is_like) {
                 *wanted = next;
                 shown = None;
@@ -307,7 +321,7 @@ impl Work {
                 self.show(wanted, number, &plan, plan.size, &picture, seen);
             }
             if left || picture.is_whole() {
-                self.slots[number].whole = Some((wanted.revision, plan, picture));
+                self.slots[number].whole = Some((wanted.shots[number].revision, plan, picture));
                 return Ok(!left);
             }
         }

@@ -1,7 +1,7 @@
 //! What the picture costs and how far off it is, what else there is, and what chooses by that.
 
-use egui::{Color32, Slider, Ui};
-use egui_plot::{Corner, Legend, Line, MarkerShape, Plot, PlotPoints, Points, uniform_grid_spacer};
+use egui::{Align2, Color32, Rangef, Slider, Ui};
+use egui_plot::{AxisHints, Line, MarkerShape, Plot, PlotPoint, PlotPoints, Points, Text, uniform_grid_spacer};
 
 use super::super::session::{Session, Target};
 use super::super::state::Edits;
@@ -21,12 +21,13 @@ fn color(model: Model) -> Color32 {
 }
 
 pub(super) fn cost(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
-    times(ui, session);
+    // What is in the hand comes first: what grows below does not move it.
+    targets(ui, session, edits);
     ui.separator();
     error(ui, session);
-    ui.separator();
-    targets(ui, session, edits);
     offers(ui, session);
+    ui.separator();
+    times(ui, session);
 }
 
 /// Milliseconds a sample, now and before.
@@ -54,16 +55,23 @@ fn error(ui: &mut Ui, session: &Session) {
     }
     match cost.error.filter(|(of, _)| *of == revision) {
         Some((_, measured)) => {
-            ui.label(format!("95 % of the pixels are within {:.1e}", measured.error));
+            let label = ui.label(format!("95 % of the pixels are within {:.1e}", measured.error));
+            label.on_hover_text("|x - r| / (r + 0.1), each channel for itself, against a reference that converges");
             let (model, samples) = (measured.model.name(), measured.samples);
             let noise =
                 if measured.noise > 0.0 { format!(", itself within {:.1e}", measured.noise) } else { String::new() };
-            ui.small(format!("of {model} with {samples} samples{noise}"));
+            one_line(ui, format!("of {model}, {samples} samples{noise}"));
         }
         None => {
             ui.label("measuring how far off this is ...");
+            one_line(ui, String::new());
         }
     }
+}
+
+/// Text that takes one line, however long it is.
+fn one_line(ui: &mut Ui, text: String) {
+    ui.add(egui::Label::new(egui::RichText::new(if text.is_empty() { " ".into() } else { text }).small()).truncate());
 }
 
 /// A tolerance or a frame rate that chooses the model.
@@ -90,16 +98,20 @@ fn targets(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         Target::Tolerance => Goal { tolerance: Some(cost.tolerance), seconds: None },
         Target::FrameRate => Goal { tolerance: None, seconds: Some(1.0 / cost.rate) },
     };
-    let Some((of, offers)) = cost.offers.as_ref().filter(|(of, _)| *of == session.state.scene_revision) else { return };
+    let Some((of, offers)) = cost.offers.as_ref().filter(|(of, _)| *of == session.state.scene_revision) else {
+        one_line(ui, "as soon as it is known what there is".into());
+        return;
+    };
     let asked = (*of, cost.target, cost.tolerance, cost.rate);
     let changed = cost.applied != Some(asked);
     let Some(best) = offers.ranked(goal).into_iter().next() else {
-        ui.small("nothing tells how far off a model is");
+        one_line(ui, "nothing tells how far off a model is".into());
         return;
     };
-    let RenderArgs { model, samples, max_depth, tolerance, .. } = best.args;
-    ui.small(format!("{}, {} samples: {:.0} ms, within {:.1e}", best.model.name(), best.samples, best.ms, best.error));
+    let (name, samples, ms, error) = (best.model.name(), best.samples, best.ms, best.error);
+    one_line(ui, format!("{name}, {samples} samples: {ms:.0} ms, expected within {error:.1e}"));
     session.cost.applied = Some(asked);
+    let RenderArgs { model, samples, max_depth, tolerance, .. } = best.args;
     let args = &mut session.state.args;
     let now = (args.model, args.samples, args.max_depth, args.tolerance);
     if changed && now != (model, samples, max_depth, tolerance) {
@@ -112,21 +124,22 @@ fn targets(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
 fn offers(ui: &mut Ui, session: &Session) {
     let revision = session.state.revision;
     let Some((of, offers)) = &session.cost.offers else {
-        ui.small("measuring what the models have to offer ...");
+        one_line(ui, "measuring what the models have to offer ...".into());
         return;
     };
-    if *of != session.state.scene_revision {
-        ui.small("as it was before the last change");
-    }
+    let is_old = *of != session.state.scene_revision;
+    one_line(
+        ui,
+        if is_old { "as it was before the last change".into() } else { "error against time; * is here".into() },
+    );
     let log = |[ms, error]: [f64; 2]| [ms.max(1e-3).log10(), error.max(1e-9).log10()];
     let decade = |mark: egui_plot::GridMark, _: &_| format!("1e{:.0}", mark.value);
-    let plot = Plot::new("offers")
-        .height(170.0)
-        .x_axis_label("ms")
-        .y_axis_label("error")
-        .legend(Legend::default().position(Corner::LeftBottom));
-    let plot = plot.x_axis_formatter(decade).y_axis_formatter(decade).show_x(false).show_y(false);
-    let plot = plot.x_grid_spacer(uniform_grid_spacer(|_| [1.0, 1.0, 1.0]));
+    let close = Rangef::new(12.0, 24.0);
+    let milliseconds = AxisHints::new_x().label("ms").formatter(decade).label_spacing(close);
+    let errors = AxisHints::new_y().label("error").formatter(decade).label_spacing(close);
+    let grid = || uniform_grid_spacer(|_| [1.0, 1.0, 1.0]);
+    let plot = Plot::new("offers").height(170.0).custom_x_axes(vec![milliseconds]).custom_y_axes(vec![errors]);
+    let plot = plot.x_grid_spacer(grid()).y_grid_spacer(grid()).show_x(false).show_y(false);
     let plot = plot.allow_scroll(false).allow_drag(false).allow_zoom(false);
     let here = session.cost.error.filter(|(of, _)| *of == revision).map(|(_, measured)| measured.error);
     let picture = session.state.pictures[0].as_ref();
@@ -137,6 +150,13 @@ fn offers(ui: &mut Ui, session: &Session) {
     plot.show(ui, |plot| {
         for (model, curve) in offers.curves(MOST_MS) {
             let points = curve.into_iter().map(log);
+            let points: Vec<_> = points.collect();
+            // Named where it begins.
+            if let Some(&[x, y]) = points.first() {
+                let name = egui::RichText::new(model.name()).small().color(color(model));
+                let side = if model.traces() { Align2::RIGHT_TOP } else { Align2::LEFT_TOP };
+                plot.text(Text::new(model.name(), PlotPoint::new(x, y), name).anchor(side));
+            }
             plot.line(Line::new(model.name(), PlotPoints::from_iter(points)).color(color(model)));
         }
         if let (Some(error), Some(ms)) = (here, ms) {

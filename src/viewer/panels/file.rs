@@ -8,7 +8,10 @@ pub(super) fn file(ui: &mut Ui, session: &mut Session) {
     let state = &mut session.state;
     ui.horizontal(|ui| {
         ui.label("Scene");
-        ui.add(egui::Label::new(&state.scene.name).truncate()).on_hover_text(&state.scene.name);
+        let name =
+            state.path.as_ref().and_then(|path| path.file_name()).map(|name| name.to_string_lossy().into_owned());
+        let name = name.unwrap_or_else(|| state.scene.name.clone());
+        ui.add(egui::Label::new(name).truncate()).on_hover_text(&state.scene.name);
     });
     ui.small("drop a scene, a mesh or an environment on the window to open it");
     ui.horizontal(|ui| {
@@ -21,7 +24,11 @@ pub(super) fn file(ui: &mut Ui, session: &mut Session) {
         }
     });
     ui.horizontal(|ui| {
-        if ui.button("Save").on_hover_text("renders the picture with all of its samples").clicked() {
+        if ui
+            .button("Save")
+            .on_hover_text("renders the light of the picture with all its samples, by the command")
+            .clicked()
+        {
             session.actions.push(Action::Save);
         }
         ui.add(TextEdit::singleline(&mut state.output).desired_width(150.0).hint_text("picture.png or .exr"));

@@ -27,7 +27,7 @@ pub(super) fn pixel(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     let picture = session.state.pictures[0].as_ref();
     let value = picture.and_then(|picture| picture.value).filter(|(of, _)| *of == [x, y]);
     if let Some((_, [r, g, b])) = value {
-        ui.label(format!("{r:.4}, {g:.4}, {b:.4}")).on_hover_text("linear Rec. 709");
+        ui.label(format!("radiance {r:.4}, {g:.4}, {b:.4}")).on_hover_text("linear Rec. 709");
     }
     let Some((of, inspection)) = &session.pixel.inspection else {
         ui.small("asking ...");
@@ -36,15 +36,16 @@ pub(super) fn pixel(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     if *of != session.state.revision {
         ui.small("as it was before the last change");
     }
-    if !inspection.is_followed {
-        ui.small("this model stops sooner; the tree is what there is");
+    if !inspection.is_followed && inspection.events.len() > 1 {
+        ui.small("the model of the picture follows fewer of these");
     }
     ui.spacing_mut().item_spacing.y = 1.0;
-    for event in inspection.events.iter().take(MOST_LINES) {
+    let followed: Vec<_> = inspection.events.iter().filter(|event| event.end != End::CutOff).collect();
+    for event in followed.iter().take(MOST_LINES) {
         line(ui, session, event);
     }
-    if inspection.events.len() > MOST_LINES {
-        ui.small(format!("and {} more", inspection.events.len() - MOST_LINES));
+    if followed.len() > MOST_LINES {
+        ui.small(format!("and {} more", followed.len() - MOST_LINES));
     }
 }
 
@@ -108,10 +109,10 @@ pub(super) fn rays(painter: &Painter, session: &Session, place: Rect) {
             Way::Reflected => Color32::from_rgb(255, 120, 90),
             _ => Color32::from_rgb(90, 230, 130),
         };
-        let share = (event.throughput.element_sum() / 3.0).sqrt().clamp(0.15, 1.0) as f32;
+        let share = (event.throughput.element_sum() / 3.0).sqrt().clamp(0.3, 1.0) as f32;
         if let Some([from, to]) = seen(&scene.camera, aspect, event.from, event.to) {
             painter
-                .line_segment([at(from[0], from[1]), at(to[0], to[1])], Stroke::new(1.5, color.gamma_multiply(share)));
+                .line_segment([at(from[0], from[1]), at(to[0], to[1])], Stroke::new(2.5, color.gamma_multiply(share)));
         }
     }
 }

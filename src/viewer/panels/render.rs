@@ -5,9 +5,10 @@ use egui::{ComboBox, DragValue, Grid, Ui};
 use super::super::session::Session;
 use super::super::state::{Beside, Edits, Shows, State};
 use super::slider;
+use crate::choice::TOLERANCE;
 use crate::effects::Effect;
 use crate::options::{Model, RenderArgs, Tonemap};
-use crate::plan::DEPTH;
+use crate::plan::{DEPTH, DEPTH_OF_TOLERANCE};
 
 pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     let state = &mut session.state;
@@ -19,6 +20,9 @@ pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
                 if ui.selectable_label(model == now, model.name()).clicked() && model != now {
                     state.args = RenderArgs { tolerance: None, max_depth: None, ..state.args.clone() };
                     state.args.model = Some(model.into());
+                    if !state.shows.is_of(model) {
+                        state.shows = Shows::Light;
+                    }
                     edits.model = true;
                 }
             }
@@ -33,11 +37,25 @@ pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         ui.end_row();
         if now != Model::Single {
             ui.label("Depth");
-            let mut depth = state.args.max_depth.unwrap_or(DEPTH);
+            let follows = state.args.tolerance.is_some() && now.traces();
+            let mut depth = state.args.max_depth.unwrap_or(if follows { DEPTH_OF_TOLERANCE } else { DEPTH });
             if ui.add(DragValue::new(&mut depth).range(1..=1024)).changed() {
                 state.args.max_depth = Some(depth);
                 edits.model = true;
             }
+            ui.end_row();
+            ui.label("Tolerance");
+            ui.horizontal(|ui| {
+                let mut tolerates = state.args.tolerance.is_some();
+                if ui.checkbox(&mut tolerates, "").changed() {
+                    state.args.tolerance = tolerates.then_some(TOLERANCE);
+                    edits.model = true;
+                }
+                if let Some(tolerance) = &mut state.args.tolerance {
+                    let value = DragValue::new(tolerance).range(1e-5..=1.0).speed(1e-3).max_decimals(5);
+                    edits.model |= ui.add(value).changed();
+                }
+            });
             ui.end_row();
         }
         let mut exposure = state.args.exposure.unwrap_or(0.0);
@@ -82,20 +100,20 @@ fn beside(ui: &mut Ui, state: &mut State, edits: &mut Edits) {
     ComboBox::from_id_salt("beside").selected_text(&name).show_ui(ui, |ui| {
         if ui.selectable_label(name == "nothing", "nothing").clicked() {
             (state.beside, state.pictures[1]) = (None, None);
-            edits.scene = true;
+            edits.beside = true;
         }
         for model in Model::ALL {
             if ui.selectable_label(name == model.name(), model.name()).clicked() {
                 let args = RenderArgs { tolerance: None, max_depth: None, samples: None, ..state.args.clone() };
                 let args = RenderArgs { model: Some(model.into()), ..args };
                 state.beside = Some(Beside { scene: None, args, name: model.name().into() });
-                edits.scene = true;
+                edits.beside = true;
             }
         }
         if ui.selectable_label(name == "as it is now", "as it is now").clicked() {
             let (scene, args) = (Some(state.scene.clone()), state.args.clone());
-            state.beside = Some(Beside { scene, args, name: "as it is now".into() });
-            edits.scene = true;
+            state.beside = Some(Beside { scene, args, name: "as it was".into() });
+            edits.beside = true;
         }
     });
     ui.end_row();
@@ -139,7 +157,7 @@ fn effects(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
             };
             let lacking = is_on && !effect.honoured_by(model);
             let mark = if lacking { format!("{} !", effect.name()) } else { effect.name().to_owned() };
-            let label = egui::Label::new(egui::RichText::new(mark).color(color)).truncate();
+            let label = egui::Label::new(egui::RichText::new(mark).size(11.5).color(color)).truncate();
             let label = ui.add(label).on_hover_text(why);
             if lacking {
                 label.on_hover_text(format!("model {} does not simulate it", model.name()));
