@@ -296,7 +296,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Option<Vec<String>>,
 
-    /// Leaves the options aside that the scene's [render] table has
+    /// Leaves the options aside that the scene's table 'render' has
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
     pub no_render_table: Option<bool>,
 
