@@ -171,25 +171,19 @@ impl Inspector {
         ray.event.object = Some(hit.index);
         ray.event.normal = normal;
         ray.event.angle = cos.acos();
-        let glass = match &scene.materials[object.material].surface {
-            Surface::Opaque(_) => {
-                if let Some(body) = self.medium(scene, &ray.inside) {
-                    let rate = body.attenuation_color.map(|color| absorption(color, body.attenuation_distance));
-                    ray.event.throughput *= rate.map(|rate| transmittance(rate, hit.distance));
-                }
-                ray.event.end = End::Opaque;
-                return Vec::new();
-            }
-            Surface::Dielectric(glass) => glass,
-        };
-        let (before, beyond) = match glass.thin_walled {
-            true => (ray.inside.clone(), ray.inside.clone()),
-            false => self.boundary(scene, hit, &ray.inside),
+        let surface = &scene.materials[object.material].surface;
+        let (before, beyond) = match surface {
+            Surface::Dielectric(glass) if !glass.thin_walled => self.boundary(scene, hit, &ray.inside),
+            _ => (ray.inside.clone(), ray.inside.clone()),
         };
         if let Some(body) = self.medium(scene, &before) {
             let per_metre = body.attenuation_color.map(|color| absorption(color, body.attenuation_distance));
             ray.event.throughput *= per_metre.map(|rate| transmittance(rate, hit.distance));
         }
+        let Surface::Dielectric(glass) = surface else {
+            ray.event.end = End::Opaque;
+            return Vec::new();
+        };
         let start = |direction: DVec3| {
             hit.position + facing(hit.normal) * (APART * reach).copysign(direction.dot(facing(hit.normal)))
         };

@@ -167,19 +167,20 @@ impl State {
     fn replace(&mut self, path: Option<PathBuf>, changes: Vec<String>) -> bool {
         let again = path == self.path;
         let args = match again {
-            true => RenderArgs { size: self.args.size.filter(|_| self.sized), ..self.args.clone() },
+            true => {
+                let env = self.given.env.clone().or(self.scene.render.env.clone());
+                let dropped = self.args.env.clone().filter(|_| self.args.env != env);
+                RenderArgs { env: dropped.or(self.given.env.clone()), ..self.given.clone() }
+            }
             // What was said of the scene before does not hold for another.
             false => RenderArgs { ior: None, roughness: None, env: None, set: None, ..self.given.clone() },
         };
         match Self::new(Options { scene: path, args }) {
             Ok(mut new) => {
-                if again && new.scene.render != self.scene.render {
-                    // What it says of itself now counts, and no more what it said.
-                    let args = RenderArgs { stats: None, ..self.given.clone() };
-                    new.args = Self::of(args.or(new.scene.render.clone())).0;
-                }
-                new.sized = self.given.size.or(new.scene.render.size).is_some();
-                if !new.sized {
+                // Where it says something else of itself than before, that counts, else what was chosen here.
+                if again && new.scene.render == self.scene.render {
+                    new.args = self.args.clone();
+                } else if !new.sized {
                     new.args.size = self.args.size;
                 }
                 for change in changes {
@@ -397,10 +398,15 @@ mod tests {
         let again = RenderArgs { no_render_table: Some(true), ..RenderArgs::default() };
         let scene = Scene::load(Some(&path), &Overrides::of(&again)).expect("a scene");
         assert_eq!(scene.render, RenderArgs::default());
-        // What the file says of itself counts where it changes.
+        // What was chosen here stays while the file says the same of itself.
+        assert!(state.reload(), "{:?}", state.error);
+        assert_eq!((state.args.model, state.args.tolerance), (Some(Model::Single.into()), None));
+        state.scene.environment.intensity = 2.0;
+        // What it says counts where it changes.
         write("samples = 3\nmodel = \"auto\"");
         assert!(state.reload(), "{:?}", state.error);
         assert_eq!((state.args.samples, state.args.model, state.args.roughness), (Some(3), None, None));
+        assert_eq!(state.scene.environment.intensity, 2.0, "what was changed stays");
         // Another scene has its own.
         assert!(state.open(std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/meshes/prism.obj")));
         assert_eq!(state.args.samples, None);

@@ -302,8 +302,7 @@ impl Work {
                 let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(picture.samples());
                 self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
             }
-            // The same with another look goes on from here.
-            // Of the others it would leave the first as it was.
+            // The same with another look goes on from here; what is beside would leave the first picture as it was.
             let revisions = |wanted: &Wanted| wanted.shots.iter().map(|shot| shot.revision).collect::<Vec<_>>();
             let these = revisions(wanted);
             let is_like = |next: &Wanted| number == 0 && revisions(next) == these && !next.moving;

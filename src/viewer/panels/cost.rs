@@ -149,8 +149,7 @@ fn offers(ui: &mut Ui, session: &Session) {
     });
     plot.show(ui, |plot| {
         for (model, curve) in offers.curves(MOST_MS) {
-            let points = curve.into_iter().map(log);
-            let points: Vec<_> = points.collect();
+            let points: Vec<_> = curve.into_iter().map(log).collect();
             // Named where it begins.
             if let Some(&[x, y]) = points.first() {
                 let name = egui::RichText::new(model.name()).small().color(color(model));
