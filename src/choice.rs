@@ -33,19 +33,20 @@ const FEWEST_PIXELS: f64 = 16.0 * 12.0;
 const FEW: u32 = 4;
 const MORE: u32 = 16;
 const MANY: u32 = 64;
+const STEP: u32 = MORE / FEW;
 const QUICK: Duration = Duration::from_millis(250);
 
-/// Cut-offs and depths of `tree`, from the default on, each followed further than the one before.
+/// Cut-offs and depths of `tree`, from the default on. Each is several times finer than the one before, so that what is left to that
+/// one shows: a tolerance is four times the cut-off.
 const RUNGS: [(Option<f64>, u32); 4] =
-    [(None, 32), (Some(1e-2), 128), (Some(1e-3), 512), (Some(1e-4), DEPTH_OF_TOLERANCE)];
+    [(None, 32), (Some(4e-3), 128), (Some(4e-4), 512), (Some(4e-5), DEPTH_OF_TOLERANCE)];
 
 /// The power of the number of samples that errors fall with at most. That of edges under evenly spread points is 0.75, and footprints
 /// shrink with 0.5; with 0.75 a hollow ball had 93.9 % of its pixels within a tolerance of 0.01 (`benches/estimates.rs`).
 const EDGES: f64 = 0.65;
 
-/// Beyond so many samples pilots tell nothing of how errors fall: with the square root of their number. It is not enough everywhere: a
-/// tinted ball has 91.7 % of its pixels within a tolerance of 0.001, and had 91.8 % with [`EDGES`] all the way.
-const FAR: f64 = 4096.0;
+/// How many times the samples of a pilot errors may be thought to fall with that power. Beyond, they fall with the square root.
+const REACH: f64 = 16.0;
 
 /// How much larger than the pilots say the error of samples may be: they are few pixels. `path` looks for itself, and is held to a
 /// little more than the tolerance says.
@@ -118,8 +119,9 @@ pub struct Choice {
 struct Law {
     /// What stays with any number of samples.
     floor: f64,
-    /// What one sample adds to that, and the power of their number that it falls with.
+    /// What samples add to that, which were so many, and the power of their number that it falls with.
     spread: f64,
+    tried: f64,
     power: f64,
     /// How much more precise than that samples should be.
     margin: f64,
@@ -131,8 +133,8 @@ struct Law {
 
 impl Law {
     fn error(&self, samples: u32) -> f64 {
-        let samples = f64::from(samples);
-        let (near, far) = (samples.min(FAR), samples.max(FAR) / FAR);
+        let ratio = f64::from(samples) / self.tried;
+        let (near, far) = (ratio.min(REACH), ratio.max(REACH) / REACH);
         self.floor.hypot(self.spread * near.powf(-self.power) / far.sqrt())
     }
 
@@ -143,12 +145,12 @@ impl Law {
             return None;
         }
         let ratio = self.margin * self.spread / left;
-        let ratio_of_far = FAR.powf(self.power);
-        let samples = match ratio > ratio_of_far {
-            true => FAR * (ratio / ratio_of_far).powi(2),
+        let reached = REACH.powf(self.power);
+        let times = match ratio > reached {
+            true => REACH * (ratio / reached).powi(2),
             false => ratio.powf(1.0 / self.power),
         };
-        let samples = samples.ceil().max(f64::from(FEW));
+        let samples = (self.tried * times).ceil().max(f64::from(FEW));
         (samples <= f64::from(MOST_SAMPLES)).then_some(samples as u32)
     }
 }
@@ -417,9 +419,8 @@ impl<'a> Pilots<'a> {
         let truth = mean(&first.radiance, &second.radiance);
         // The difference of two has twice the variance of one.
         let error = most(differences(&first.radiance, &second.radiance)) / SQRT_2;
-        let spread = error * f64::from(samples).sqrt();
         if let Some(args) = taken {
-            let law = Law { floor: 0.0, spread, power: 0.5, margin: MARGIN_OF_PATH, ms, lacks: 0 };
+            let law = Spread { error, samples, power: 0.5 }.law(0.0, MARGIN_OF_PATH, ms, 0);
             self.laws.push((args, Model::Path, law));
         }
         self.truth = Some(truth);
@@ -439,22 +440,27 @@ impl<'a> Pilots<'a> {
         if plan.lacks() > 0 {
             return self.inexact(renderer, args.clone());
         }
-        let (spread, power) = self.spread(&mut renderer, args)?;
-        let mut before: Option<(RenderArgs, Vec<[f32; 3]>, f64)> = None;
+        let spread = self.spread(&mut renderer, args, self.goal.tolerance)?;
+        let mut found: Vec<(RenderArgs, Vec<[f32; 3]>, f64)> = Vec::new();
         for args in rungs {
             let plan = self.plan(&args, FEW, 0)?;
             renderer.set_limits(&plan)?;
             let start = Instant::now();
             let rendered = renderer.render(&plan, &mut |_| {})?;
             let host = start.elapsed();
-            let (ms, finer) = (self.ms(&rendered, host), rendered.radiance);
-            let Some((args, coarse, ms)) = before.replace((args, finer.clone(), ms)) else { continue };
-            let floor = most(errors(&coarse, &finer));
-            self.laws.push((args, Model::Tree, Law { floor, spread, power, margin: MARGIN, ms, lacks: 0 }));
-            let is_enough = floor <= CUT_SHARE * self.goal.tolerance.unwrap_or(1e-3);
+            let ms = self.ms(&rendered, host);
+            let floor = found.last().map(|(_, coarse, _)| most(errors(coarse, &rendered.radiance)));
+            found.push((args, rendered.radiance, ms));
+            let is_enough = floor.is_some_and(|floor| floor <= CUT_SHARE * self.goal.tolerance.unwrap_or(1e-3));
             if is_enough || host > LONG || !self.fits(Duration::ZERO) {
                 break;
             }
+        }
+        // The last one tells what the others miss, and nothing what it misses.
+        let Some((_, finest, _)) = found.pop() else { return Ok(()) };
+        for (args, picture, ms) in found {
+            let floor = most(errors(&picture, &finest));
+            self.laws.push((args, Model::Tree, spread.law(floor, MARGIN, ms, 0)));
         }
         Ok(())
     }
@@ -474,7 +480,7 @@ impl<'a> Pilots<'a> {
     fn inexact(&mut self, mut renderer: Renderer, args: RenderArgs) -> Result<()> {
         let Some(truth) = self.truth.take() else { return Ok(()) };
         let start = Instant::now();
-        let (spread, power) = self.spread(&mut renderer, &args)?;
+        let spread = self.spread(&mut renderer, &args, None)?;
         let samples = if self.fits(start.elapsed() * 2) { MORE } else { FEW };
         let plan = self.plan(&args, samples, 0)?;
         renderer.set_limits(&plan)?;
@@ -486,7 +492,7 @@ impl<'a> Pilots<'a> {
         let root = (squares / (3 * truth.len()) as f64).sqrt();
         let floor = most(errors(&rendered.radiance, &truth)).max(root);
         let ms = if plan.model.traces() { ms } else { self.raster_ms(&args)? };
-        let law = Law { floor, spread, power, margin: MARGIN, ms, lacks: plan.lacks() };
+        let law = spread.law(floor, MARGIN, ms, plan.lacks());
         self.laws.push((args, plan.model, law));
         self.truth = Some(truth);
         Ok(())
@@ -503,9 +509,8 @@ impl<'a> Pilots<'a> {
         Ok(rendered.gpu_ms().unwrap_or(start.elapsed().as_secs_f64() * 1e3))
     }
 
-    /// How the error of one sample is, and how it falls with their number: pictures of two seeds, of few samples and, where there is
-    /// time, of more.
-    fn spread(&self, renderer: &mut Renderer, args: &RenderArgs) -> Result<(f64, f64)> {
+    /// How pictures of two seeds differ: of few samples, of more where there is time, and of a share of those that a tolerance takes.
+    fn spread(&self, renderer: &mut Renderer, args: &RenderArgs, tolerance: Option<f64>) -> Result<Spread> {
         let mut error_of = |samples| -> Result<f64> {
             let mut picture = |seed| -> Result<Vec<[f32; 3]>> {
                 let plan = self.plan(args, samples, seed)?;
@@ -516,14 +521,41 @@ impl<'a> Pilots<'a> {
             Ok(most(differences(&first, &second)) / SQRT_2)
         };
         let start = Instant::now();
-        let few = error_of(FEW)?;
-        let is_known = few > 0.0 && self.fits(start.elapsed() * (MORE / FEW));
-        let more = if is_known { error_of(MORE)? } else { 0.0 };
-        if few <= 0.0 || more <= 0.0 {
-            return Ok((few * f64::from(FEW).sqrt(), 0.5));
+        let mut spread = Spread { error: error_of(FEW)?, samples: FEW, power: 0.5 };
+        let mut time = start.elapsed();
+        loop {
+            let is_near = spread.samples > FEW
+                && tolerance.is_none_or(|tolerance| {
+                    let needed = spread.law(0.0, MARGIN, 0.0, 0).samples(tolerance);
+                    needed.is_none_or(|needed| f64::from(needed) <= REACH * f64::from(spread.samples))
+                });
+            if is_near || spread.error <= 0.0 || !self.fits(time * STEP) {
+                return Ok(spread);
+            }
+            let start = Instant::now();
+            let samples = STEP * spread.samples;
+            let error = error_of(samples)?;
+            if error <= 0.0 {
+                return Ok(spread);
+            }
+            time = start.elapsed();
+            let power = (spread.error / error).ln() / f64::from(STEP).ln();
+            spread = Spread { error, samples, power: power.clamp(0.5, EDGES) };
         }
-        let power = ((few / more).ln() / f64::from(MORE / FEW).ln()).clamp(0.5, EDGES);
-        Ok((more * f64::from(MORE).powf(power), power))
+    }
+}
+
+/// The error of a number of samples, and the power of their number that it falls with.
+#[derive(Clone, Copy, Debug)]
+struct Spread {
+    error: f64,
+    samples: u32,
+    power: f64,
+}
+
+impl Spread {
+    fn law(self, floor: f64, margin: f64, ms: f64, lacks: usize) -> Law {
+        Law { floor, spread: self.error, tried: f64::from(self.samples), power: self.power, margin, ms, lacks }
     }
 }
 

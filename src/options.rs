@@ -14,7 +14,7 @@ use crate::effects::{Effect, Selection};
 pub const MOST_DEPTH: u32 = 1 << 16;
 
 /// The most samples per pixel that may be asked for.
-pub const MOST_SAMPLES: u32 = 1 << 20;
+pub const MOST_SAMPLES: u32 = 1 << 24;
 
 /// A light transport model: how far the light is followed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -229,7 +229,7 @@ macro_rules! ranges {
 }
 
 ranges! {
-    samples: u32, |x| (1..=super::MOST_SAMPLES).contains(&x), "1 to 1048576 samples";
+    samples: u32, |x| (1..=super::MOST_SAMPLES).contains(&x), "1 to 16777216 samples";
     max_depth: u32, |x| (1..=super::MOST_DEPTH).contains(&x), "a depth from 1 to 65536";
     positive: f64, |x| x > 0.0 && x.is_finite(), "a number above 0";
     unit: f64, |x| (0.0..=1.0).contains(&x), "a number from 0 to 1";

@@ -396,7 +396,7 @@ fn materials_of_objects_must_exist() {
 fn render_options_are_checked_and_named() {
     let folder = Folder::new();
     for (option, wanted) in [
-        ("samples = 0", "--samples <N>': expected 1 to 1048576 samples"),
+        ("samples = 0", "--samples <N>': expected 1 to 16777216 samples"),
         ("samples = \"9\"", "samples: expected a whole number, found \"9\""),
         ("model = \"fast\"", "possible values: single"),
         ("model = 1", "model: expected a name, found 1"),
