@@ -14,4 +14,4 @@ pub use compare::{CompareReport, MetricValues};
 pub use cost::CostReport;
 pub use explain::Explanation;
 pub use numerics::{NumericsFiles, NumericsReport};
-pub use stats::{BuildTimes, DeviceStats, PassStats, Run, Stats};
+pub use stats::{BuildTimes, DeviceStats, DiscardedStats, PassStats, Run, Stats};

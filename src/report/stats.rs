@@ -154,7 +154,7 @@ pub struct DiscardedStats {
 }
 
 impl DiscardedStats {
-    fn new(discarded: &[f32]) -> Self {
+    pub(crate) fn new(discarded: &[f32]) -> Self {
         let sum: f64 = discarded.iter().map(|&x| f64::from(x)).sum();
         Self { max: discarded.iter().copied().fold(0.0, f32::max), mean: sum / discarded.len() as f64 }
     }

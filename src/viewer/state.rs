@@ -1,5 +1,6 @@
 //! What the viewer looks at, and how. In flow files and edits, out flow pictures to be wanted and the command that repeats one.
 
+use std::hash::{DefaultHasher, Hash as _, Hasher as _};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -262,14 +263,15 @@ impl State {
         }];
         if let Some(beside) = &self.beside {
             let (camera, framed) = (scene.camera, scene.framed);
-            let scene = match &beside.scene {
-                Some(scene) => Scene { camera, framed, ..scene.clone() },
-                None => scene,
+            // What is as it was is not made anew for what changes beside it, nor is another model's for those of this one.
+            let (scene, revision) = match &beside.scene {
+                Some(scene) => (Scene { camera, framed, ..scene.clone() }, fingerprint(&camera, size)),
+                None => (scene, self.scene_revision),
             };
             let look = RenderArgs { exposure: self.args.exposure, tonemap: self.args.tonemap, ..beside.args.clone() };
             let args = RenderArgs { size: self.args.size, ..look };
             let shows = shows(model_of(&args));
-            shots.push(Shot { revision: [self.revision, self.beside_revision + 1], scene, args, shows });
+            shots.push(Shot { revision: [revision, self.beside_revision + 1], scene, args, shows });
         }
         Wanted { shots, pixel: None, moving, asked }
     }
@@ -335,6 +337,14 @@ pub(super) fn model_of(args: &RenderArgs) -> Model {
         Some(ModelChoice::Only(model)) => model,
         _ => Model::Single,
     }
+}
+
+/// Tells a view from others.
+fn fingerprint(camera: &Camera, size: Size) -> u64 {
+    let mut hasher = DefaultHasher::new();
+    let numbers = [camera.position, camera.target, camera.up].map(|vector| vector.to_array().map(f64::to_bits));
+    (numbers, camera.vertical_fov.to_bits(), size.width, size.height).hash(&mut hasher);
+    hasher.finish()
 }
 
 /// A word as a POSIX shell reads it back.

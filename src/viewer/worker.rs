@@ -15,6 +15,7 @@ use crate::gpu::{Gpu, GpuError, Image, PassTime};
 use crate::options::{Model, RenderArgs, Size};
 use crate::passes::{Refinement, Renderer, Step};
 use crate::plan::{Budget, Plan};
+use crate::report::DiscardedStats;
 use crate::scene::Scene;
 use crate::{Error, Result};
 
@@ -72,7 +73,7 @@ pub(super) struct Picture {
     pub(super) of: Option<u32>,
     /// Device time of each pass, of all samples.
     pub(super) passes: Vec<PassTime>,
-    /// What the model does not simulate, or by something simpler.
+    /// What the model does not simulate, or by something simpler, and what it cut off.
     pub(super) lacks: Vec<String>,
     /// What its colours stand for, where they are not those of light.
     pub(super) legend: Option<Legend>,
@@ -141,6 +142,8 @@ struct Seen {
     legend: Option<Legend>,
     /// The pixel that was asked for, and its radiance.
     value: Option<([u32; 2], [f32; 3])>,
+    /// What was cut off, of a picture that has all of its samples.
+    discarded: Option<DiscardedStats>,
 }
 
 fn shown(renderer: &mut Renderer, picture: &mut Refinement, shot: &Shot, pixel: Option<[u32; 2]>) -> Result<Seen> {
@@ -153,13 +156,16 @@ fn shown(renderer: &mut Renderer, picture: &mut Refinement, shot: &Shot, pixel: 
     };
     let RenderArgs { exposure, tonemap, .. } = shot.args;
     picture.set_look(exposure.unwrap_or(0.0), tonemap.unwrap_or_default());
+    let is_cut = picture.is_whole() && model_of(&shot.args) == Model::Tree;
+    let counts = if is_cut { renderer.counts(picture)? } else { None };
+    let discarded = counts.and_then(|counts| counts.discarded).map(|discarded| DiscardedStats::new(&discarded));
     if shot.shows != Shows::Light
         && let Some(counts) = renderer.counts(picture)?
         && let Some((pixels, legend)) = colors(shot.shows, &counts, &renderer.radiance(picture)?)
     {
-        return Ok(Seen { image: renderer.image_of(picture.size(), &pixels)?, legend: Some(legend), value });
+        return Ok(Seen { image: renderer.image_of(picture.size(), &pixels)?, legend: Some(legend), value, discarded });
     }
-    Ok(Seen { image: renderer.display(picture)?, legend: None, value })
+    Ok(Seen { image: renderer.display(picture)?, legend: None, value, discarded })
 }
 
 /// One of the pictures.
@@ -213,7 +219,7 @@ impl Work {
             }
         }
         for &number in &new {
-            let coarse = self.coarse(wanted, number)?;
+            let coarse = self.coarse(wanted, number, new.len())?;
             let stood_in = self.slots[number].stood_in == Some(wanted.shots[number].revision);
             if wanted.moving || coarse > 1.0 && !stood_in {
                 self.stand_in(wanted, number, coarse, /* leaves: */ false)?;
@@ -222,7 +228,7 @@ impl Work {
         for &number in &new {
             // Finer ones, where the first round of the whole picture lets wait: that of `path` has many samples.
             let paths = model_of(&wanted.shots[number].args) == Model::Path;
-            let mut coarse = self.coarse(wanted, number)?;
+            let mut coarse = self.coarse(wanted, number, new.len())?;
             while !wanted.moving && coarse > 1.0 && !self.orders.is_late() {
                 coarse = (coarse / FINER).max(1.0);
                 if coarse > FINEST || paths {
@@ -245,11 +251,11 @@ impl Work {
         Ok(())
     }
 
-    /// How coarse a stand-in has to be to take no longer than one may.
-    fn coarse(&self, wanted: &Wanted, number: usize) -> Result<f64> {
+    /// How coarse a stand-in has to be, one of `of`, for all to take no longer than one may.
+    fn coarse(&self, wanted: &Wanted, number: usize, of: usize) -> Result<f64> {
         let whole = Plan::new(&wanted.shots[number].scene, &wanted.shots[number].args)?;
         let speed = self.speed.get(whole.model.name()).copied().unwrap_or_default();
-        let pixels = speed.pixels(STAND_IN.as_secs_f64() * 1e3 / wanted.shots.len() as f64);
+        let pixels = speed.pixels(STAND_IN.as_secs_f64() * 1e3 / of as f64);
         let least = (whole.size.pixels() / pixels).sqrt();
         Ok(COARSE.into_iter().find(|&coarse| coarse >= least).unwrap_or(COARSE[COARSE.len() - 1]))
     }
@@ -349,10 +355,14 @@ impl Work {
         plan: &Plan,
         whole: Size,
         picture: &Refinement,
-        Seen { image, legend, value }: Seen,
+        Seen { image, legend, value, discarded }: Seen,
     ) {
         let lacks = [(&plan.unsupported, "does not simulate"), (&plan.approximate, "approximates")];
         let lacks = lacks.into_iter().filter(|(effects, _)| **effects != Default::default());
+        let lacks = lacks.map(|(effects, what)| format!("{what} {}", effects.names().join(", ")));
+        let cut = discarded.filter(|discarded| discarded.max > 0.0).map(|DiscardedStats { max, mean }| {
+            format!("cut off: up to {max:.1e} of a pixel's light, {mean:.1e} in the mean")
+        });
         self.orders.tell(News::Picture(Picture {
             number,
             image: Arc::new(image),
@@ -364,7 +374,7 @@ impl Work {
                 Budget::Seconds { .. } => None,
             },
             passes: picture.passes().to_vec(),
-            lacks: lacks.map(|(effects, what)| format!("{what} {}", effects.names().join(", "))).collect(),
+            lacks: lacks.chain(cut).collect(),
             legend,
             value,
             moving: wanted.moving,
