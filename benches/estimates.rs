@@ -5,7 +5,7 @@
 //! What is counted are the pixels, each channel for itself, whose |x - r| / (r + 0.1) is below the tolerance. `tree` promises what it
 //! cuts off: r is the same samples followed on and on. `path` promises what its samples scatter: r is another picture of it, and the
 //! difference of two is larger by the square root of 2. What `auto` chooses is held against `tree` with many times the samples where
-//! that simulates all there is, else against `path`, with a fifth of the tolerance where it is another model.
+//! that simulates all there is (4 times at the finest), else against `path`, with a fifth of the tolerance where it is another model.
 
 #[allow(dead_code, reason = "the tests use the rest")]
 #[path = "../tests/tree/shapes.rs"]
@@ -27,6 +27,9 @@ use vitrum::scene::{Dielectric, Dispersion, Opaque, Overrides, Scene, Surface};
 
 /// Samples of pictures of `tree` that hold each other's cut-offs.
 const SAMPLES: u32 = 4;
+
+/// Below this, pictures and references are small: samples grow with the square of what is asked.
+const FINE: f64 = 5e-3;
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
@@ -109,7 +112,7 @@ impl Bench {
         let label = format!("{}, {}", best.model.name(), found.samples);
         if best.model == Model::Tree {
             let deep = RenderArgs {
-                samples: Some(16 * best.samples.max(4)),
+                samples: Some(if tolerance < FINE { 4 } else { 16 } * best.samples.max(4)),
                 tolerance: Some(0.03 * tolerance),
                 max_depth: Some(1024),
                 seed: Some(77),
@@ -160,15 +163,14 @@ fn main() -> Result<()> {
         }
         let mut scene = scene.clone();
         for &tolerance in &tolerances {
-            // Samples grow with the square of what is asked: the pictures shrink.
-            let (width, height) = if tolerance < 5e-3 { (16, 12) } else { (32, 24) };
+            let (width, height) = if tolerance < FINE { (16, 12) } else { (32, 24) };
             let size = Size { width, height };
             scene.frame(4.0 / 3.0);
             let tree = bench.tree(&scene, tolerance, Size { width: 64, height: 48 })?;
             let tree = tree.map_or("".into(), |share| format!("{:.2} %", 100.0 * share));
             let (auto, chosen) = bench.auto(&scene, tolerance, size)?;
             // At the finest one `path` would take days of scenes that it is not chosen for, and hours once more of those that it is.
-            let is_fine = tolerance < 5e-3;
+            let is_fine = tolerance < FINE;
             let path = match chosen.strip_prefix("path, ") {
                 Some(samples) if is_fine => format!("{:.1} % ({samples})", 100.0 * auto),
                 None if is_fine => String::new(),

@@ -8,7 +8,7 @@
 //!
 //! [`scene`] is plain data without a Vulkan type, [`effects`] the table of what can be simulated, [`plan`] what one
 //! render does, [`gpu`] the only room with `unsafe`, [`passes`] the frame, [`image`] pixels and their files,
-//! [`compare`] metrics between two images, [`cost`] what accuracy takes, [`report`] what is told about a render,
+//! [`compare`] metrics between two images, [`cost`] what accuracy takes, [`regress`] pictures held against references, [`report`] what is told about a render,
 //! [`commands`] what the binary offers.
 //! [`optics`] states in 64-bit arithmetic what `shaders/` computes in 32, and [`numerics`] holds one against the other
 //! on a device.
@@ -31,8 +31,10 @@ pub mod options;
 mod parallel;
 pub mod passes;
 pub mod plan;
+pub mod regress;
 pub mod report;
 pub mod scene;
+mod shell;
 pub mod viewer;
 
 pub use error::{Error, Result};

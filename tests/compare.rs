@@ -73,8 +73,8 @@ fn bad_usage_and_bad_input_end_with_2_one_line_and_nothing_written() {
         (&["cut.png", "a.png"], &["cut.png: cannot be read as PNG"]),
         (&["a.png", "wide.png"], &["a.png: is 16x12, not 12x16", "wide.png"]),
         (&["a.exr", "wide.png", "--map", "m.png"], &["16x12", "12x16"]),
-        (&["a.exr", "b.exr", "--fail-above", "flip"], &["METRIC=VALUE", "relmse, mse, max, flip"]),
-        (&["a.exr", "b.exr", "--fail-above", "ssim=1"], &["ssim", "relmse, mse, max, flip"]),
+        (&["a.exr", "b.exr", "--fail-above", "flip"], &["METRIC=VALUE", "relmse, mse, p99, max, flip"]),
+        (&["a.exr", "b.exr", "--fail-above", "ssim=1"], &["ssim", "relmse, mse, p99, max, flip"]),
         (&["a.exr", "b.exr", "--fail-above", "mse=low"], &["low", "number"]),
         (&["a.exr", "b.exr", "--fail-above", "mse=nan"], &["nan", "number"]),
         (&["a.exr", "b.exr", "--fail-above", "psnr=40"], &["psnr", "mse"]),
@@ -106,7 +106,7 @@ fn the_table_names_metrics_and_kinds_of_flip() {
     assert_eq!((output.status.code(), stderr(&output).as_str()), (Some(0), ""));
     let text = stdout(&output);
     let names: Vec<_> = text.lines().map(|line| line.split_whitespace().next().unwrap_or_default()).collect();
-    assert_eq!(names, ["relmse", "mse", "psnr", "max", "flip"], "{text}");
+    assert_eq!(names, ["relmse", "mse", "psnr", "p99", "max", "flip"], "{text}");
     assert!(text.contains("1.1875e0  at 5,3") && text.contains("HDR-FLIP, 2 exposures from "), "{text}");
     let text = stdout(&vitrum(&folder, &["compare", "a.png", "b.png"]));
     assert!(text.contains("LDR-FLIP"), "{text}");
@@ -141,7 +141,7 @@ fn json_holds_the_numbers() {
     assert!(found["exposures"]["start"].as_f64() < found["exposures"]["stop"].as_f64(), "{found}");
 
     let found = json_of(&vitrum(&folder, &["compare", "--json", "a.png", "a.png"]));
-    let none = json!({ "relmse": 0.0, "mse": 0.0, "psnr": null, "max": 0.0, "flip": 0.0 });
+    let none = json!({ "relmse": 0.0, "mse": 0.0, "psnr": null, "p99": 0.0, "max": 0.0, "flip": 0.0 });
     assert_eq!((&found["metrics"], &found["flip_kind"]), (&none, &json!("ldr")));
     assert_eq!(found["exposures"], Value::Null);
 }
@@ -168,7 +168,7 @@ fn pixels_that_are_not_finite_pass_no_limit() {
         let found = json_of(&vitrum(&folder, &["compare", "--json", test, reference]));
         assert_eq!(found["non_finite"], json!({ "test": counts[0], "reference": counts[1] }));
         assert_eq!(found["max_at"], json!([5, 3]));
-        for metric in ["relmse", "mse", "psnr", "max", "flip"] {
+        for metric in ["relmse", "mse", "psnr", "p99", "max", "flip"] {
             assert_eq!(found["metrics"][metric], Value::Null, "{metric}");
         }
         for limit in ["relmse=1e9", "mse=1e9", "max=1e9", "flip=1e9"] {

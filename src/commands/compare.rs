@@ -23,7 +23,7 @@ pub(super) struct CompareCommand {
     #[arg(value_name = "B")]
     reference: PathBuf,
 
-    /// Exit with 1 where METRIC is above VALUE or not finite: relmse, mse, max or flip (psnr falls where errors grow: limit mse);
+    /// Exit with 1 where METRIC is above VALUE or not finite: relmse, mse, p99, max or flip (psnr falls where errors grow: limit mse);
     /// may be given several times
     #[arg(long, value_name = "METRIC=VALUE")]
     fail_above: Vec<Limit>,
@@ -41,6 +41,7 @@ const METRICS: &str = "Metrics, over pixels and channels of linear values x of A
   relmse: mean((x - r)^2 / (r^2 + 0.01))
   mse: mean((x - r)^2)
   psnr: -10 log10(mse), in dB; inf for equal images
+  p99: the |x - r| / (|r| + 0.1) that 99 % of the values keep
   max: the largest |x - r|, and the pixel that has it
   flip: the mean of FLIP, 0 to 1, at 67 pixels per degree: LDR-FLIP where both files hold 8-bit sRGB, else HDR-FLIP
 Where a pixel is NaN or infinite, no metric is finite: NaN or inf in the table, null in JSON. docs/compare.md has more.";

@@ -15,6 +15,7 @@ use crate::options::{RenderArgs, Size, Trace, range};
 use crate::plan::DEPTH;
 use crate::report::CostReport;
 use crate::scene::Scene;
+use crate::shell;
 use crate::{Error, Result};
 
 /// The size of the pictures, where the user has no wish: errors hardly depend on it, and time is pixels.
@@ -148,28 +149,26 @@ impl CostCommand {
 
     /// The command line that repeats this.
     fn command(&self) -> String {
-        // For a shell as Unix has them.
-        let is_plain = |c: char| c.is_alphanumeric() || "-_./,:+@%".contains(c);
-        let quoted = |text: String| match text.chars().all(is_plain) {
-            true => text,
-            false => format!("'{}'", text.replace('\'', "'\\''")),
-        };
-        let path = |path: &PathBuf| quoted(path.display().to_string());
+        let text = |value: Option<&dyn std::fmt::Display>| value.map(|value| value.to_string());
+        let path = |path: &PathBuf| path.display().to_string();
+        let Changes { ior, roughness, env, set } = &self.changes;
         let options = [
-            ("", self.scene.as_ref().map(path)),
-            ("-o ", self.output.as_ref().map(path)),
-            ("--size ", self.size.map(|size| size.to_string())),
-            ("--reference-time ", self.reference_time.map(|x| x.to_string())),
-            ("--effects ", self.effects.as_ref().map(Selection::to_string)),
-            ("--max-depth ", self.max_depth.map(|x| x.to_string())),
-            ("--seed ", self.seed.map(|x| x.to_string())),
-            ("--ior ", self.changes.ior.map(|x| x.to_string())),
-            ("--roughness ", self.changes.roughness.map(|x| x.to_string())),
-            ("--env ", self.changes.env.as_ref().map(path)),
-            ("--device ", self.device.clone().map(quoted)),
-            ("--trace ", self.trace.map(|trace| trace.name().to_owned())),
+            ("size", text(self.size.as_ref().map(|x| x as _))),
+            ("reference-time", text(self.reference_time.as_ref().map(|x| x as _))),
+            ("effects", text(self.effects.as_ref().map(|x| x as _))),
+            ("max-depth", text(self.max_depth.as_ref().map(|x| x as _))),
+            ("seed", text(self.seed.as_ref().map(|x| x as _))),
+            ("ior", text(ior.as_ref().map(|x| x as _))),
+            ("roughness", text(roughness.as_ref().map(|x| x as _))),
+            ("env", env.as_ref().map(path)),
+            ("device", self.device.clone()),
+            ("trace", self.trace.map(|trace| trace.name().to_owned())),
+            ("output", self.output.as_ref().map(path)),
         ];
-        let given = options.into_iter().filter_map(|(name, value)| Some(format!(" {name}{}", value?)));
-        format!("vitrum cost{}", given.collect::<String>())
+        let given = options.into_iter().filter_map(|(name, value)| Some(format!("--{name}={}", value?)));
+        let settings = set.iter().map(|setting| format!("--set={setting}"));
+        let scene = self.scene.as_ref().map(path);
+        let words = ["vitrum".to_owned(), "cost".to_owned()].into_iter().chain(given).chain(settings).chain(scene);
+        shell::line(words)
     }
 }

@@ -5,6 +5,7 @@ mod cost;
 mod devices;
 mod explain;
 mod numerics;
+mod regress;
 mod render;
 mod view;
 
@@ -45,6 +46,8 @@ enum Command {
     Cost(Box<cost::CostCommand>),
     /// Says how far an image is from a reference
     Compare(compare::CompareCommand),
+    /// Renders a suite of pictures and compares them with their references
+    Regress(regress::RegressCommand),
     /// Holds the shaders' optics functions on a device against 64-bit arithmetic
     Numerics(numerics::NumericsCommand),
     /// Lists the Vulkan devices and what each can do
@@ -136,6 +139,7 @@ pub fn main() -> ExitCode {
         Command::Explain(command) => command.run(),
         Command::Cost(command) => command.run(cli.talk),
         Command::Compare(command) => command.run(cli.talk),
+        Command::Regress(command) => command.run(cli.talk),
         Command::Numerics(command) => command.run(cli.talk),
         Command::Devices(command) => command.run(),
     };

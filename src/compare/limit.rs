@@ -58,8 +58,8 @@ mod tests {
     #[test]
     fn what_is_no_limit_says_what_would_be_one() {
         for (text, wanted) in [
-            ("flip", "METRIC=VALUE, as in flip=0.05; metrics: relmse, mse, max, flip"),
-            ("ssim=0.1", "unknown metric \"ssim\"; known: relmse, mse, max, flip"),
+            ("flip", "METRIC=VALUE, as in flip=0.05; metrics: relmse, mse, p99, max, flip"),
+            ("ssim=0.1", "unknown metric \"ssim\"; known: relmse, mse, p99, max, flip"),
             ("=1", "unknown metric \"\""),
             ("psnr=40", "limit mse, which is 10^(-psnr/10)"),
             ("mse=", "\"\" is no limit of mse"),

@@ -21,6 +21,8 @@ pub enum Metric {
     Mse,
     /// [`psnr`].
     Psnr,
+    /// [`p99`].
+    P99,
     /// The largest absolute difference of a channel.
     Max,
     /// The mean of FLIP.
@@ -29,7 +31,7 @@ pub enum Metric {
 
 impl Metric {
     /// All, in the order in which they are told.
-    pub const ALL: [Self; 5] = [Self::Relmse, Self::Mse, Self::Psnr, Self::Max, Self::Flip];
+    pub const ALL: [Self; 6] = [Self::Relmse, Self::Mse, Self::Psnr, Self::P99, Self::Max, Self::Flip];
 
     /// Its name on the command line and in JSON.
     pub fn name(self) -> &'static str {
@@ -37,6 +39,7 @@ impl Metric {
             Self::Relmse => "relmse",
             Self::Mse => "mse",
             Self::Psnr => "psnr",
+            Self::P99 => "p99",
             Self::Max => "max",
             Self::Flip => "flip",
         }
@@ -57,6 +60,8 @@ pub struct Comparison {
     pub mse: f64,
     /// [`psnr`].
     pub psnr: f64,
+    /// [`p99`].
+    pub p99: f64,
     /// The largest absolute difference of a channel.
     pub max: f64,
     /// Column and row of the first pixel with that difference, or that is not finite.
@@ -83,6 +88,7 @@ impl Comparison {
             Metric::Relmse => self.relmse,
             Metric::Mse => self.mse,
             Metric::Psnr => self.psnr,
+            Metric::P99 => self.p99,
             Metric::Max => self.max,
             Metric::Flip => self.flip.mean,
         }
@@ -114,6 +120,7 @@ pub fn compare(test: Stored, reference: Stored) -> Result<Comparison, String> {
         relmse: relmse(&test, &reference),
         mse,
         psnr: psnr(mse),
+        p99: p99(&test, &reference),
         max,
         max_at: [at as u32 % width, at as u32 / width],
         flip: flip(width as usize, &test, &reference),
@@ -144,6 +151,24 @@ pub fn mse(test: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
 /// Peak signal-to-noise ratio in dB, for a peak of 1; infinite where the error is 0.
 pub fn psnr(mse: f64) -> f64 {
     -10.0 * mse.log10()
+}
+
+/// The |x - r| / (|r| + 0.1) that 99 % of the values keep, pixels and channels: blind to single pixels, such as those at edges that
+/// rounding moves. NaN where a pixel is not finite and for no pixels.
+///
+/// # Panics
+///
+/// Where there are more pixels in one than in the other.
+pub fn p99(test: &[[f32; 3]], reference: &[[f32; 3]]) -> f64 {
+    assert_eq!(test.len(), reference.len(), "images of one size");
+    let pairs = test.as_flattened().iter().zip(reference.as_flattened()).map(|(&x, &r)| (f64::from(x), f64::from(r)));
+    let mut errors: Vec<f64> = pairs.map(|(x, r)| (x - r).abs() / (r.abs() + DARK.sqrt())).collect();
+    if errors.iter().any(|error| !error.is_finite()) {
+        return f64::NAN;
+    }
+    errors.sort_by(f64::total_cmp);
+    let place = (0.99 * errors.len() as f64).ceil() as usize;
+    errors.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
 }
 
 /// The largest absolute difference of a channel and the first pixel that has it; of pixels that are not finite the
@@ -194,7 +219,7 @@ mod tests {
         for found in
             [compare(image(), image()).unwrap(), compare(srgb(vec![[1, 2, 3]; 4]), srgb(vec![[1, 2, 3]; 4])).unwrap()]
         {
-            for metric in [Metric::Relmse, Metric::Mse, Metric::Max, Metric::Flip] {
+            for metric in [Metric::Relmse, Metric::Mse, Metric::P99, Metric::Max, Metric::Flip] {
                 assert_eq!(found.get(metric), 0.0, "{}", metric.name());
             }
             assert_eq!((found.psnr, found.max_at), (f64::INFINITY, [0, 0]));
@@ -211,6 +236,12 @@ mod tests {
         close(found.relmse, (0.25 / 0.26 + 1.0 / 9.01 + 0.0625 / 0.0725) / 12.0);
         close(found.psnr, 10.0 * (12.0f64 / 1.3125).log10());
         assert_eq!((found.max, found.max_at), (1.0, [1, 1]));
+        close(found.p99, 0.5 / 0.6);
+        let (mut test, reference) = (vec![[1.01_f32; 3]; 100], vec![[1.0_f32; 3]; 100]);
+        test[7] = [9.0; 3];
+        assert!((p99(&test, &reference) - 0.01 / 1.1).abs() < 1e-6, "one pixel of a hundred counts for nothing");
+        test[8][0] = 9.0;
+        assert!(p99(&test, &reference) > 1.0);
     }
 
     #[test]
@@ -250,7 +281,7 @@ mod tests {
                 let count = |pixels: &Vec<[f32; 3]>| usize::from(pixels == &bad || pixels[1][2].is_nan());
                 assert_eq!(found.non_finite, NonFinite { test: count(test), reference: count(reference) });
                 assert_eq!((found.flip.map[1], found.error_map()[1]), (1.0, magma::color(1.0)));
-                for limit in ["relmse=1e300", "mse=1e300", "max=1e300", "flip=1"] {
+                for limit in ["relmse=1e300", "mse=1e300", "p99=1e300", "max=1e300", "flip=1"] {
                     assert!(limit.parse::<Limit>().unwrap().broken(&found).is_some(), "{limit} with {wrong}");
                 }
             }

@@ -9,7 +9,7 @@ use exr::meta::header::Header;
 use exr::prelude::*;
 
 use super::read::{Unreadable, check_size};
-use super::{FloatImage, Metadata};
+use super::{FloatImage, Layer, Metadata};
 
 /// An EXR of one part: `R`, `G`, `B` and `LAYER.CHANNEL`, 32-bit float, ZIP, `metadata` as text attributes.
 pub fn encode(image: &FloatImage, metadata: &Metadata) -> std::io::Result<Vec<u8>> {
@@ -66,6 +66,36 @@ fn sort_attributes(file: &mut [u8]) {
     }
     attributes.sort();
     file[AFTER_VERSION..start].copy_from_slice(&attributes.concat());
+}
+
+/// A file as [`encode`] makes them: colours, layers and texts.
+pub fn decode_whole(bytes: &[u8]) -> std::result::Result<(FloatImage, Vec<(String, String)>), Unreadable> {
+    // It refuses what is not as it claims to be.
+    let colors = decode(bytes)?;
+    let wrong = |error: exr::error::Error| Unreadable(error.to_string());
+    let read = exr::prelude::read().no_deep_data().largest_resolution_level().all_channels();
+    let image = read.first_valid_layer().all_attributes().from_buffered(Cursor::new(bytes)).map_err(wrong)?;
+    let layer = image.layer_data;
+    if layer.size.area() != colors.pixels.len() {
+        return Err(Unreadable("holds layers of another size than the image".into()));
+    }
+    let mut layers: Vec<Layer> = Vec::new();
+    for channel in layer.channel_data.list {
+        let name = channel.name.to_string();
+        let Some((of, name)) = name.rsplit_once('.') else { continue };
+        let values = channel.sample_data.values_as_f32().collect();
+        match layers.iter_mut().find(|layer| layer.name == of) {
+            Some(layer) => layer.channels.push((name.into(), values)),
+            None => layers.push(Layer { name: of.into(), channels: vec![(name.into(), values)] }),
+        }
+    }
+    let text = |(key, value): (&Text, &AttributeValue)| match value {
+        AttributeValue::Text(value) => Some((key.to_string(), value.to_string())),
+        _ => None,
+    };
+    let mut texts: Vec<_> = layer.attributes.other.iter().filter_map(text).collect();
+    texts.sort();
+    Ok((FloatImage { layers, ..colors }, texts))
 }
 
 /// Red, green and blue of the display window of an EXR: where the data window ends the image is black. Luminance alone
@@ -207,7 +237,6 @@ fn in_window(size: Vec2<usize>, pixels: Vec<[f32; 3]>, position: Vec2<i32>, wind
 
 #[cfg(test)]
 mod tests {
-    use super::super::Layer;
     use super::*;
 
     fn image() -> FloatImage {
@@ -232,6 +261,12 @@ mod tests {
         let decoded = decode(&encode(&image(), &metadata()).unwrap()).unwrap();
         assert_eq!((decoded.width, decoded.height), (3, 2));
         assert_eq!(decoded.pixels, image().pixels);
+        let (mut whole, texts) = decode_whole(&encode(&image(), &metadata()).unwrap()).unwrap();
+        whole.layers.sort_by(|a, b| b.name.cmp(&a.name));
+        assert_eq!(whole, image());
+        let mut expected = metadata();
+        expected.sort();
+        assert_eq!(texts, expected);
     }
 
     #[test]

@@ -55,7 +55,7 @@ pub use checkpoint::is_checkpoint;
 pub use counts::{Counts, DARK, MOST_PIXELS, PIXELS_BY_STDERR, error_of, is_within, relative_error};
 pub use probe::{Hit, Leaks, Ray, TraceProbe};
 pub use renderer::{Refinement, Renderer, Step};
-pub use sampling::{OPEN_BATCH, pixel_offsets};
+pub use sampling::{OPEN_BATCH, batches_of, pixel_offsets};
 
 /// Radiance in flight, and means of it.
 const RADIANCE: Format = Format::Rgba32Float;

@@ -72,6 +72,11 @@ fn batches(budget: Budget) -> impl Iterator<Item = Round> {
     })
 }
 
+/// How many batches the standard errors of a picture of `path` are from, with that many samples.
+pub fn batches_of(plan: &Plan, samples: u32) -> u32 {
+    batches(plan.budget).next().map_or(0, |round| samples / round.samples)
+}
+
 /// `push` with the wavelengths of its sample: those of all samples share the spectrum evenly.
 fn spectrum(push: SamplePush, budget: Budget) -> SamplePush {
     let index = f64::from(push.sample_index);

@@ -30,6 +30,7 @@ pub struct MetricValues {
     pub relmse: f64,
     pub mse: f64,
     pub psnr: f64,
+    pub p99: f64,
     pub max: f64,
     pub flip: f64,
 }
@@ -47,6 +48,7 @@ impl CompareReport {
                 relmse: found.relmse,
                 mse: found.mse,
                 psnr: found.psnr,
+                p99: found.p99,
                 max: found.max,
                 flip: found.flip.mean,
             },
@@ -59,7 +61,7 @@ impl CompareReport {
 
     /// The table for a terminal: a metric a line.
     pub fn table(&self) -> String {
-        let MetricValues { relmse, mse, psnr, max, flip } = self.metrics;
+        let MetricValues { relmse, mse, psnr, p99, max, flip } = self.metrics;
         let [x, y] = self.max_at;
         let kind = match self.exposures {
             Some(Exposures { start, count: 1, .. }) => format!("HDR-FLIP, exposure {start:+.2} EV"),
@@ -72,11 +74,12 @@ impl CompareReport {
             (Metric::Relmse, format!("{relmse:.4e}"), String::new()),
             (Metric::Mse, format!("{mse:.4e}"), String::new()),
             (Metric::Psnr, format!("{psnr:.2}"), "dB".into()),
+            (Metric::P99, format!("{p99:.4e}"), String::new()),
             (Metric::Max, format!("{max:.4e}"), format!("at {x},{y}")),
             (Metric::Flip, format!("{flip:.6}"), kind),
         ];
         if max == 0.0 {
-            rows[3].2.clear();
+            rows[4].2.clear();
         }
         let mut text = String::new();
         for (metric, value, more) in rows {

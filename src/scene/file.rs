@@ -1,21 +1,22 @@
 //! The TOML scene file. In flow its text and the files it names, out flows a [`Scene`]; what is wrong in it is an error
 //! with file, line and what would be right.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DVec3};
-use toml::de::DeTable;
 
 use super::assembly::{Assembly, Placement, Wear, check_mesh_kind};
 use super::camera::DEFAULT_FOV;
 use super::files::Files;
 use super::material::Glass;
 use super::mesh::FARTHEST;
-use super::table::{Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT};
+use super::render_table::options;
+use super::table::{
+    Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT, text,
+};
 use super::{Camera, Dielectric, Dispersion, Material, Opaque, PointLight, Surface, builtin};
+use crate::Result;
 use crate::options::RenderArgs;
-use crate::{Error, Result};
 
 /// Where an environment comes from, before images are read.
 #[derive(Clone, Debug)]
@@ -58,19 +59,14 @@ pub struct SceneFile {
 /// Reads the scene file at `path`.
 pub fn read(files: Files, path: &Path) -> Result<SceneFile> {
     let bytes = files.read(path)?;
-    let text = std::str::from_utf8(&bytes).map_err(|error| {
-        let line = bytes[..error.valid_up_to()].iter().filter(|&&byte| byte == b'\n').count() + 1;
-        Error::input(path, line, "is not UTF-8 text; save it as UTF-8")
-    })?;
-    let document = Document { path, text };
-    let parsed = DeTable::parse(text)
-        .map_err(|error| document.error(error.span().unwrap_or(0..0), error.message().replace('\n', ", ")))?;
+    let document = Document { path, text: text(path, &bytes)? };
+    let parsed = document.parse()?;
     let root = Table::root(document, &parsed, &["environment", "camera", "render", "light", "material", "object"])?;
     let reader = Reader { files, folder: path.parent().unwrap_or(Path::new("")) };
 
     let environment = root.or("environment", EnvironmentTable::default(), |entry| reader.environment(entry))?;
     let camera = root.get("camera").map(camera).transpose()?;
-    let render = root.or("render", RenderArgs::default(), |entry| reader.render(entry))?;
+    let render = root.or("render", RenderArgs::default(), |entry| options(entry, "render", files, reader.folder))?;
     let lights = root.or("light", Vec::new(), |entry| entry.tables()?.into_iter().map(light).collect())?;
     let mut assembly = Assembly::default();
     if let Some(materials) = root.get("material") {
@@ -132,24 +128,10 @@ enum Kind {
 }
 
 impl Reader<'_> {
-    /// A file that exists.
-    fn path(&self, entry: Entry<'_>) -> Result<PathBuf> {
-        let path = self.folder.join(entry.text("a file name")?);
-        if self.files.exists(&path) {
-            return Ok(path);
-        }
-        let why = match path.metadata() {
-            Ok(metadata) if metadata.is_dir() => "is a folder, not a file",
-            Ok(_) => "is no regular file",
-            Err(_) => "does not exist",
-        };
-        Err(entry.error(format!("{}: {:?} {why}", entry.key, path.display().to_string())))
-    }
-
     fn environment(&self, entry: Entry<'_>) -> Result<EnvironmentTable> {
         let table = entry.table("environment", &["image", "color", "intensity", "rotation", "visible"])?;
         let light = match (table.get("image"), table.get("color")) {
-            (Some(image), None) => Light::Image(self.files, self.path(image)?),
+            (Some(image), None) => Light::Image(self.files, image.file(self.files, self.folder)?),
             (None, Some(color)) => Light::Color(color.triple(&LIGHT)?),
             (Some(_), Some(color)) => {
                 return Err(color.error("[environment] has both image and color; keep one of them"));
@@ -162,39 +144,6 @@ impl Reader<'_> {
             rotation: table.or("rotation", 0.0, |entry| entry.number(&FINITE))?.to_radians(),
             visible: table.or("visible", true, |entry| entry.boolean())?,
         })
-    }
-
-    /// Options of `render`: each value is put as on the command line, so that both know the same ranges.
-    fn render(&self, entry: Entry<'_>) -> Result<RenderArgs> {
-        let names: Vec<_> = RenderArgs::names().iter().map(|name| name.replace('-', "_")).collect();
-        let names: Vec<_> = names.iter().map(String::as_str).collect();
-        let mut all = RenderArgs::default();
-        for entry in entry.table("render", &names)?.entries() {
-            let value = self.option(entry)?;
-            let option = RenderArgs::one(&entry.key.replace('_', "-"), &value);
-            all = option.map_err(|message| entry.error(format!("[render]: {message}")))?.or(all);
-        }
-        Ok(all)
-    }
-
-    fn option(&self, entry: Entry<'_>) -> Result<OsString> {
-        let text = match entry.key {
-            "env" => return Ok(self.path(entry)?.into()),
-            "stats" | "checkpoint" => return Ok(self.folder.join(entry.text("a file name")?).into()),
-            "size" => {
-                entry.integers::<2>("width and height, as in [1024, 768]")?.map(|side| side.to_string()).join("x")
-            }
-            "effects" | "aov" => entry.texts("names, as in \"a,b\" or [\"a\", \"b\"]")?.join(","),
-            "device" => match entry.as_text() {
-                Some(name) => name.to_owned(),
-                None => entry.integer()?.to_string(),
-            },
-            "samples" | "max_depth" | "seed" => entry.integers::<1>("a whole number")?[0].to_string(),
-            "validation" | "flipped_ratio" => entry.boolean()?.to_string(),
-            "model" | "tonemap" | "trace" => entry.text("a name")?.to_owned(),
-            _ => entry.number(&FINITE)?.to_string(),
-        };
-        Ok(text.into())
     }
 
     fn surface(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<Surface> {
@@ -226,14 +175,14 @@ impl Reader<'_> {
     }
 
     fn texture(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<usize> {
-        let texture = assembly.textures.open(self.files, &self.path(entry)?, &mut assembly.warnings);
+        let texture = assembly.textures.open(self.files, &entry.file(self.files, self.folder)?, &mut assembly.warnings);
         texture.map_err(|error| entry.error(format!("{}: {}", entry.key, error.in_full())))
     }
 
     fn object<'a>(&self, entry: Entry<'a>, number: usize, materials: &[Material]) -> Result<ObjectTable<'a>> {
         let table = entry.table("[object]", &["mesh", "material", "translate", "rotate", "scale", "smooth"])?;
         let mesh = table.require("mesh")?;
-        let path = self.path(mesh)?;
+        let path = mesh.file(self.files, self.folder)?;
         let name = path.display().to_string();
         check_mesh_kind(&path).map_err(|message| mesh.error(format!("mesh {name:?}: {message}")))?;
         let wear = table.or("material", Wear::Own, |entry| material_number(entry, materials).map(Wear::Material))?;

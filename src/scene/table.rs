@@ -2,12 +2,13 @@
 //! range or errors with file and line.
 
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use glam::DVec3;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
+use super::files::Files;
 use crate::{Error, Result};
 
 /// A file and its text, for the lines in errors.
@@ -17,6 +18,22 @@ pub struct Document<'a> {
     pub path: &'a Path,
     /// Its content.
     pub text: &'a str,
+}
+
+/// The text of the file at `path`.
+pub fn text<'a>(path: &Path, bytes: &'a [u8]) -> Result<&'a str> {
+    std::str::from_utf8(bytes).map_err(|error| {
+        let line = bytes[..error.valid_up_to()].iter().filter(|&&byte| byte == b'\n').count() + 1;
+        Error::input(path, line, "is not UTF-8 text; save it as UTF-8")
+    })
+}
+
+impl<'a> Document<'a> {
+    /// The whole of it, as TOML.
+    pub fn parse(&self) -> Result<Spanned<DeTable<'a>>> {
+        DeTable::parse(self.text)
+            .map_err(|error| self.error(error.span().unwrap_or(0..0), error.message().replace('\n', ", ")))
+    }
 }
 
 impl Document<'_> {
@@ -50,8 +67,10 @@ pub struct Table<'a> {
 
 /// Which numbers are right, and how to say so.
 pub struct Rule {
-    wanted: &'static str,
-    holds: fn(f64) -> bool,
+    /// What is expected.
+    pub wanted: &'static str,
+    /// Whether a number is.
+    pub holds: fn(f64) -> bool,
 }
 
 /// Any number but NaN and the infinities.
@@ -266,6 +285,20 @@ impl<'a> Entry<'a> {
     /// A text that is not empty.
     pub fn text(&self, wanted: &str) -> Result<&'a str> {
         self.as_text().filter(|text| !text.is_empty()).ok_or_else(|| self.unexpected(wanted))
+    }
+
+    /// A file that exists, in `folder` where its name does not say otherwise.
+    pub fn file(&self, files: Files, folder: &Path) -> Result<PathBuf> {
+        let path = folder.join(self.text("a file name")?);
+        if files.exists(&path) {
+            return Ok(path);
+        }
+        let why = match path.metadata() {
+            Ok(metadata) if metadata.is_dir() => "is a folder, not a file",
+            Ok(_) => "is no regular file",
+            Err(_) => "does not exist",
+        };
+        Err(self.error(format!("{}: {:?} {why}", self.key, path.display().to_string())))
     }
 
     /// One of the words of `choices`.

@@ -11,6 +11,7 @@ use crate::Result;
 use crate::effects::{Caller, Effect, Selection};
 use crate::options::{Model, ModelChoice, RenderArgs, Size};
 use crate::scene::{Camera, Overrides, Scene};
+use crate::shell;
 
 /// What was changed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -328,7 +329,7 @@ impl State {
     pub(super) fn command(&self) -> String {
         let words = ["vitrum".to_owned(), "render".to_owned()].into_iter().chain(self.options());
         let words = words.chain([format!("-o={}", self.output)]).chain(self.scene_word());
-        words.map(|word| quoted(&word)).collect::<Vec<_>>().join(" ")
+        shell::line(words)
     }
 }
 
@@ -347,26 +348,9 @@ fn fingerprint(camera: &Camera, size: Size) -> u64 {
     hasher.finish()
 }
 
-/// A word as a POSIX shell reads it back.
-fn quoted(word: &str) -> String {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || "-_=+,./:@%".contains(c);
-    match !word.is_empty() && word.chars().all(is_plain) {
-        true => word.to_owned(),
-        false => format!("'{}'", word.replace('\'', r"'\''")),
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn words_are_quoted_for_a_shell() {
-        assert_eq!(quoted("--set=camera.up=[0,1,0]"), "'--set=camera.up=[0,1,0]'");
-        assert_eq!(quoted("it's"), r"'it'\''s'");
-        assert_eq!(quoted(""), "''");
-        assert_eq!(quoted("--model=tree"), "--model=tree");
-    }
 
     #[test]
     fn the_command_has_what_was_changed() {
