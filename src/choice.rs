@@ -215,12 +215,15 @@ impl Measurements {
         all
     }
 
-    /// Milliseconds and errors of each model with 1, 2, 4, ... samples, as far as `most_ms`.
-    pub fn curves(&self, most_ms: f64) -> Vec<(Model, Vec<[f64; 2]>)> {
-        let curve = |(_, model, law): &(RenderArgs, Model, Law)| {
+    /// Milliseconds and errors of each model with 1, 2, 4, ... samples, as far as `most_ms`; where it has several settings, their depths
+    /// tell them apart.
+    pub fn curves(&self, most_ms: f64) -> Vec<(Model, Option<u32>, Vec<[f64; 2]>)> {
+        let several = |model: Model| self.laws.iter().filter(|(_, other, _)| *other == model).count() > 1;
+        let curve = |(args, model, law): &(RenderArgs, Model, Law)| {
             let samples = (0..20).map(|power| 1_u32 << power);
             let points = samples.map(|samples| [law.ms * f64::from(samples), law.error(samples)]);
-            (*model, points.take_while(|&[ms, error]| ms <= most_ms && error > 0.0).collect())
+            let depth = args.max_depth.filter(|_| several(*model));
+            (*model, depth, points.take_while(|&[ms, error]| ms <= most_ms && error > 0.0).collect())
         };
         self.laws.iter().map(curve).collect()
     }

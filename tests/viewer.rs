@@ -110,9 +110,9 @@ fn the_copied_command_repeats_the_picture() {
     desktop.drag([1138, 207], [1160, 207]);
     // File, and its button.
     std::thread::sleep(Duration::from_millis(500));
-    desktop.click([1036, 349]);
+    desktop.click([1036, 357]);
     std::thread::sleep(Duration::from_millis(500));
-    desktop.click([1130, 426]);
+    desktop.click([1185, 440]);
     std::thread::sleep(Duration::from_millis(500));
     let command = desktop.clipboard();
     println!("{command}");
@@ -193,6 +193,62 @@ fn a_file_that_changes_is_shown_anew() {
     desktop.drop_file(&diamond);
     shows(&desktop, &render(folder.path(), "diamond", &diamond.display().to_string()), "a dropped mesh");
     desktop.close();
+}
+
+/// A picture that takes minutes is shown with another exposure at once.
+#[test]
+fn exposure_changes_what_is_not_done_yet() {
+    if Validated::open().is_none() {
+        return;
+    }
+    let args = ["--validation", "-v", "--model", "path", "--samples", "65536"];
+    let Some(desktop) = Desktop::open(SIZE, &args) else { return };
+    let brightness = || {
+        let [columns, rows] = CLEAR;
+        let shown = desktop.screenshot();
+        let places = rows.flat_map(|row| columns.clone().map(move |column| row * usize::from(SIZE[0]) + column));
+        places.map(|place| u64::from(shown[place][1])).sum::<u64>() / (CLEAR[0].len() * CLEAR[1].len()) as u64
+    };
+    let waits = |done: &dyn Fn(u64) -> bool, what: &str| {
+        let start = Instant::now();
+        while !done(brightness()) {
+            assert!(start.elapsed() < Duration::from_secs(30), "{what}");
+            std::thread::sleep(Duration::from_millis(100));
+        }
+    };
+    waits(&|brightness| brightness > 40, "there is a picture");
+    // Some stand-ins later.
+    std::thread::sleep(Duration::from_secs(4));
+    let before = brightness();
+    desktop.drag([1138, 144], [1160, 144]);
+    waits(&|now| now > before + 40, "a brighter one");
+    desktop.close();
+}
+
+/// A key with Ctrl is not that key.
+#[test]
+fn ctrl_q_closes_and_ctrl_w_does_not_fly() {
+    if Validated::open().is_none() {
+        return;
+    }
+    const CTRL: u8 = 37;
+    const Q: u8 = 24;
+    const W: u8 = 25;
+    let folder = tempfile::tempdir().expect("a folder");
+    let Some(desktop) = Desktop::open(SIZE, &["--validation", "-v", "--samples", "2"]) else { return };
+    let plain = render(folder.path(), "plain", "");
+    shows(&desktop, &plain, "the built-in scene");
+    desktop.focus();
+    for key in [W, Q] {
+        for (kind, key) in [(2, CTRL), (2, key), (3, key), (3, CTRL)] {
+            desktop.event(kind, key, [0, 0]);
+        }
+        if key == W {
+            std::thread::sleep(Duration::from_millis(500));
+            shows(&desktop, &plain, "Ctrl+W");
+        }
+    }
+    desktop.ends();
 }
 
 /// Whatever happens: no message, no crash, and no more memory. `VITRUM_EVENTS` says how many events there are.

@@ -256,6 +256,15 @@ pub enum Step {
 }
 
 impl Refinement {
+    /// The share of its samples that are done, with those of the round under way; `None` where it is not known how many there will be.
+    pub fn share(&self) -> Option<f64> {
+        let Budget::Samples(all) = self.plan.budget else { return None };
+        let under_way = self.under_way.as_ref().map_or(0.0, |(round, place)| {
+            f64::from(round.samples) * f64::from(place.row) / f64::from(self.targets.mean.height())
+        });
+        Some((f64::from(self.samples) + under_way) / f64::from(all))
+    }
+
     /// Samples per pixel so far.
     pub fn samples(&self) -> u32 {
         self.samples

@@ -202,7 +202,7 @@ impl Run<'_> {
         let mut plan = Plan::new(&scene, &given)?;
         scene.frame(f64::from(plan.size.width) / f64::from(plan.size.height));
         let is_random = plan.model == Model::Path;
-        let env = given.env.clone().map(|path| self.from_suite(&path));
+        let env = given.env.clone().map(|path| self.in_suite(&path));
         let options = RenderArgs { env, ..plan.options.clone() }.to_string();
         if let (true, Some(seed)) = (is_random, self.wishes.seed) {
             plan = Plan::new(&scene, &RenderArgs { seed: Some(seed), ..given })?;
@@ -227,7 +227,7 @@ impl Run<'_> {
     }
 
     /// A path as the suite has it, which is the same wherever that is run from.
-    fn from_suite(&self, path: &Path) -> std::path::PathBuf {
+    fn in_suite(&self, path: &Path) -> std::path::PathBuf {
         path.strip_prefix(self.suite.folder()).unwrap_or(path).into()
     }
 
@@ -320,7 +320,7 @@ impl Run<'_> {
     /// What the reference and the result say of their making.
     fn provenance(&self, picture: &Picture, ready: &Ready, made: &Made) -> Vec<(String, String)> {
         let mut texts = metadata(self.device, &ready.scene, &ready.plan, made.rendered.samples);
-        let scene = picture.scene.as_ref().map(|scene| self.from_suite(scene).display().to_string());
+        let scene = picture.scene.as_ref().map(|scene| self.in_suite(scene).display().to_string());
         for (key, text) in &mut texts {
             match key.as_str() {
                 "vitrum:scene" => *text = scene.clone().unwrap_or_else(|| "built-in".into()),

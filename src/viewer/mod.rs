@@ -70,7 +70,9 @@ pub fn run(options: Options) -> Result<Vec<Arc<Messages>>> {
     };
     let event_loop = EventLoop::<()>::with_user_event().build().map_err(none)?;
     event_loop.set_control_flow(ControlFlow::Wait);
-    let session = Session::new(State::new(options)?);
+    // What cannot be written is said before there is a window.
+    options.args.stats.as_deref().map(OutputFile::new).transpose()?;
+    let session = Session::new(options)?;
     let proxy = event_loop.create_proxy();
     let (messages, losses) = (Vec::new(), Vec::new());
     let mut app = App { session, shown: None, proxy, closes: false, end: Ok(()), messages, losses };
@@ -216,15 +218,26 @@ impl App {
             session.actions.push(Action::Open(file.path().to_path_buf()));
         }
         let context = shown.egui.egui_ctx().clone();
-        let output = context.run_ui(input, |ui| edits.add(panels::all(ui, session)));
+        let quit = egui::KeyboardShortcut::new(egui::Modifiers::COMMAND, egui::Key::Q);
+        let mut closes = false;
+        let output = context.run_ui(input, |ui| {
+            closes |= ui.ctx().input_mut(|input| input.consume_shortcut(&quit));
+            edits.add(panels::all(ui, session));
+        });
+        self.closes = closes;
         if edits.any() {
             (session.state.error, session.state.notice) = (None, None);
         }
         shown.look_at_files(session, &self.proxy);
+        let said = |session: &Session| (session.state.error.clone(), session.state.notice.clone());
+        let before = said(session);
         shown.act(session, &mut edits);
+        if said(session) != before {
+            // It was laid out before there was anything to say.
+            shown.window.request_redraw();
+        }
         shown.egui.handle_platform_output(&shown.window, output.platform_output);
         shown.screen.set_textures(output.textures_delta)?;
-        self.closes = context.input(|input| input.modifiers.command && input.key_pressed(egui::Key::Q));
         shown.ask(session, edits, heard);
         // What moves is drawn with its next picture.
         let waits = (edits.scene || edits.model) && timed.is_none() && start.duration_since(shown.drawn) < GAP;
@@ -264,13 +277,15 @@ impl Shown {
                 News::Picture(picture) => {
                     let number = picture.number;
                     if number == 0 {
-                        timed = Some((picture.asked, picture.moving, picture.size != picture.whole));
-                        if picture.size == picture.whole {
+                        timed = Some((picture.asked, picture.moving, picture.stand_in));
+                        state.progress = None;
+                        if !picture.stand_in {
                             session.cost.keep(&picture);
                         }
                     }
                     state.pictures[number] = Some(picture);
                 }
+                News::Progress(share) => state.progress = Some(share),
                 News::Failed(error) => state.error = Some(error),
                 News::Lost => return Err(Error::Gpu(GpuError::Lost)),
             }
@@ -290,7 +305,9 @@ impl Shown {
             && let Some((child, file)) = self.saving.take()
         {
             match child.wait_with_output() {
-                Ok(output) if output.status.success() => state.notice = Some(format!("saved {file}")),
+                Ok(output) if output.status.success() => {
+                    (state.error, state.notice) = (None, Some(format!("saved {file}")));
+                }
                 Ok(output) => {
                     let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
                     let said = said.strip_prefix("error: ").unwrap_or(&said);
@@ -354,15 +371,19 @@ impl Shown {
                     edits.scene |= opened;
                 }
                 Action::Reload => edits.scene |= state.reload(),
+                Action::Revert => {
+                    state.revert();
+                    edits.scene = true;
+                }
                 Action::Copy => {
                     self.egui.egui_ctx().copy_text(state.command());
-                    state.notice = Some("the command is on the clipboard".into());
+                    (state.error, state.notice) = (None, Some("the command is on the clipboard".into()));
                 }
                 Action::Save if self.saving.is_some() => state.error = Some("another picture is being saved".into()),
                 Action::Save => match save(state) {
                     Ok(child) => {
                         self.saving = Some((child, state.output.clone()));
-                        state.notice = Some(format!("rendering {} ...", state.output));
+                        (state.error, state.notice) = (None, Some(format!("rendering {} ...", state.output)));
                     }
                     Err(error) => state.error = Some(error.in_full()),
                 },

@@ -4,13 +4,16 @@ use std::collections::VecDeque;
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use super::Options;
 use super::disk::Recent;
 use super::inspect::Inspection;
 use super::state::State;
 use super::survey::{Measured, Query};
 use super::worker::Picture;
+use crate::Result;
 use crate::choice::Measurements;
 use crate::gpu::Placed;
+use crate::options::ModelChoice;
 
 /// Pictures whose times are plotted.
 const HISTORY: usize = 120;
@@ -27,6 +30,8 @@ pub(super) enum Ask {
 pub(super) enum Action {
     Open(PathBuf),
     Reload,
+    /// The scene as its file has it.
+    Revert,
     /// Renders the picture into [`State::output`].
     Save,
     /// Puts the command that repeats the picture on the clipboard.
@@ -46,6 +51,8 @@ pub(super) enum Target {
 /// The Cost window.
 pub(super) struct Cost {
     pub(super) is_open: bool,
+    /// Whether it is unfolded at first.
+    pub(super) opens: bool,
     /// Milliseconds of a sample of each pass, of the last pictures.
     pub(super) history: VecDeque<Vec<(&'static str, f64)>>,
     pub(super) error: Option<(u64, Measured)>,
@@ -63,6 +70,7 @@ impl Default for Cost {
     fn default() -> Self {
         Self {
             is_open: false,
+            opens: false,
             history: VecDeque::new(),
             error: None,
             no_error: None,
@@ -76,6 +84,14 @@ impl Default for Cost {
 }
 
 impl Cost {
+    /// Has the model chosen, as `--model auto` does.
+    fn choose(&mut self, tolerance: Option<f64>, seconds: Option<f64>) {
+        self.opens = true;
+        self.target = if seconds.is_some() && tolerance.is_none() { Target::FrameRate } else { Target::Tolerance };
+        self.tolerance = tolerance.unwrap_or(self.tolerance);
+        self.rate = seconds.map_or(self.rate, f64::recip);
+    }
+
     pub(super) fn keep(&mut self, picture: &Picture) {
         let samples = f64::from(picture.samples);
         let times = picture.passes.iter().filter_map(|pass| pass.gpu_ms.map(|ms| (pass.name, ms / samples)));
@@ -109,9 +125,18 @@ pub(super) struct Session {
 }
 
 impl Session {
-    pub(super) fn new(state: State) -> Self {
-        let (cost, pixel) = (Cost::default(), Pixel::default());
-        Self { state, cost, pixel, actions: Vec::new(), recent: Recent::load(), placed: Vec::new(), asked: None }
+    pub(super) fn new(options: Options) -> Result<Self> {
+        let (path, args) = (options.scene.clone(), options.args.clone());
+        let state = State::new(options)?;
+        let args = args.or(state.scene.render.clone());
+        let (mut cost, pixel, mut recent) = (Cost::default(), Pixel::default(), Recent::load());
+        if args.model == Some(ModelChoice::Auto) {
+            cost.choose(args.tolerance, args.time_budget);
+        }
+        if let Some(path) = &path {
+            recent.add(path);
+        }
+        Ok(Self { state, cost, pixel, actions: Vec::new(), recent, placed: Vec::new(), asked: None })
     }
 
     /// What is to be measured of what is at rest, if that is not under way already.

@@ -99,6 +99,8 @@ pub(super) struct State {
     pub(super) error: Option<String>,
     /// What went well last, until something else is asked for.
     pub(super) notice: Option<String>,
+    /// The share of the picture's samples that are done, where more than those that are shown are.
+    pub(super) progress: Option<f64>,
     /// The picture, and what is beside it.
     pub(super) pictures: [Option<Picture>; 2],
     pub(super) beside: Option<Beside>,
@@ -131,6 +133,7 @@ impl State {
             args,
             error: None,
             notice,
+            progress: None,
             pictures: [None, None],
             beside: None,
             wipe: 0.5,
@@ -147,9 +150,10 @@ impl State {
     fn of(args: RenderArgs) -> (RenderArgs, Option<String>) {
         let is_auto = args.model == Some(ModelChoice::Auto);
         let model = args.model.filter(|_| !is_auto);
-        let notice = is_auto.then(|| "model auto: Cost chooses a model by its error or its rate".into());
+        let notice = is_auto.then(|| "model auto: Cost chooses, as soon as it is known what there is".into());
+        let (tolerance, time_budget) = if is_auto { (None, None) } else { (args.tolerance, args.time_budget) };
         // Layers and checkpoints are for files.
-        (RenderArgs { model, aov: None, checkpoint: None, ..args }, notice)
+        (RenderArgs { model, tolerance, time_budget, aov: None, checkpoint: None, ..args }, notice)
     }
 
     pub(super) fn model(&self) -> Model {
@@ -164,6 +168,11 @@ impl State {
     /// The same files again, with what was changed here.
     pub(super) fn reload(&mut self) -> bool {
         self.replace(self.path.clone(), self.scene.settings_since(&self.before))
+    }
+
+    /// What was changed of the scene is forgotten.
+    pub(super) fn revert(&mut self) {
+        self.scene = self.before.clone();
     }
 
     fn replace(&mut self, path: Option<PathBuf>, changes: Vec<String>) -> bool {

@@ -12,7 +12,7 @@ use super::colors::{Legend, colors};
 use super::desk::{self, Hand, Orders};
 use super::state::{Shows, model_of};
 use crate::gpu::{Gpu, GpuError, Image, PassTime};
-use crate::options::{Model, RenderArgs, Size};
+use crate::options::{Model, RenderArgs, Size, Tonemap};
 use crate::passes::{Refinement, Renderer, Step};
 use crate::plan::{Budget, Plan};
 use crate::report::DiscardedStats;
@@ -32,8 +32,9 @@ const FINEST: f64 = 1.5;
 /// Milliseconds of a pixel, where nothing is known.
 const SLOW: f64 = 5e-3;
 
-/// How often a picture is shown while it grows.
+/// How often a picture is shown while it grows, and how often is told how far it is.
 const PERIOD: Duration = Duration::from_millis(150);
+const TELLING: Duration = Duration::from_millis(500);
 
 /// How long a submission should take: whoever moves something waits for its end.
 pub(super) const PATIENCE: Duration = Duration::from_millis(25);
@@ -66,8 +67,6 @@ pub(super) struct Picture {
     pub(super) number: usize,
     pub(super) image: Arc<Image>,
     pub(super) size: Size,
-    /// The size of what it stands for.
-    pub(super) whole: Size,
     pub(super) samples: u32,
     /// How many there will be; `None` where that is not known.
     pub(super) of: Option<u32>,
@@ -82,11 +81,15 @@ pub(super) struct Picture {
     pub(super) moving: bool,
     /// When it was asked for.
     pub(super) asked: Instant,
+    /// Whether a finer one or one with more samples is under way in its place.
+    pub(super) stand_in: bool,
 }
 
 /// What there is to hear.
 pub(super) enum News {
     Picture(Picture),
+    /// The share of the first picture's samples that are done.
+    Progress(f64),
     /// The picture that was wanted cannot be made.
     Failed(String),
     /// The device is gone.
@@ -95,7 +98,11 @@ pub(super) enum News {
 
 impl desk::News for News {
     fn replaces(&self, before: &Self) -> bool {
-        matches!((self, before), (Self::Picture(new), Self::Picture(old)) if new.number == old.number)
+        match (self, before) {
+            (Self::Picture(new), Self::Picture(old)) => new.number == old.number,
+            (Self::Progress(_), Self::Progress(_)) => true,
+            _ => false,
+        }
     }
 }
 
@@ -168,12 +175,34 @@ fn shown(renderer: &mut Renderer, picture: &mut Refinement, shot: &Shot, pixel: 
     Ok(Seen { image: renderer.display(picture)?, legend: None, value, discarded })
 }
 
+/// A stand-in that was shown.
+struct StandIn {
+    revision: [u64; 2],
+    plan: Plan,
+    picture: Refinement,
+    look: Look,
+}
+
+/// How a picture is shown.
+#[derive(Clone, Copy, PartialEq)]
+struct Look {
+    exposure: Option<f64>,
+    tonemap: Option<Tonemap>,
+    shows: Shows,
+}
+
+impl Shot {
+    fn look(&self) -> Look {
+        Look { exposure: self.args.exposure, tonemap: self.args.tonemap, shows: self.shows }
+    }
+}
+
 /// One of the pictures.
 #[derive(Default)]
 struct Slot {
     renderer: Option<Renderer>,
-    /// The revision that a stand-in was of last.
-    stood_in: Option<[u64; 2]>,
+    /// The last stand-in, which may be shown with another look.
+    stand_in: Option<StandIn>,
     /// The whole one, as far as it is, and the revision that it is of.
     whole: Option<([u64; 2], Plan, Refinement)>,
 }
@@ -220,7 +249,9 @@ impl Work {
         }
         for &number in &new {
             let coarse = self.coarse(wanted, number, new.len())?;
-            let stood_in = self.slots[number].stood_in == Some(wanted.shots[number].revision);
+            let before = self.slots[number].stand_in.as_ref();
+            let stood_in = before.is_some_and(|before| before.revision == wanted.shots[number].revision);
+            self.show_again(wanted, number)?;
             if wanted.moving || coarse > 1.0 && !stood_in {
                 self.stand_in(wanted, number, coarse, /* leaves: */ false)?;
             }
@@ -231,8 +262,11 @@ impl Work {
             let mut coarse = self.coarse(wanted, number, new.len())?;
             while !wanted.moving && coarse > 1.0 && !self.orders.is_late() {
                 coarse = (coarse / FINER).max(1.0);
-                if coarse > FINEST || paths {
-                    self.stand_in(wanted, number, coarse, /* leaves: */ true)?;
+                let is_worth_it = coarse > FINEST || paths;
+                while is_worth_it && !self.stand_in(wanted, number, coarse, /* leaves: */ true)? {
+                    if !self.takes_look(wanted)? {
+                        return Ok(());
+                    }
                 }
             }
         }
@@ -260,8 +294,8 @@ impl Work {
         Ok(COARSE.into_iter().find(|&coarse| coarse >= least).unwrap_or(COARSE[COARSE.len() - 1]))
     }
 
-    /// One sample of a coarser picture. `leaves`: whether it is left where something else is wanted.
-    fn stand_in(&mut self, wanted: &Wanted, number: usize, coarse: f64, leaves: bool) -> Result<()> {
+    /// One sample of a coarser picture. `leaves`: whether it is left where something else is wanted; false if it was.
+    fn stand_in(&mut self, wanted: &Wanted, number: usize, coarse: f64, leaves: bool) -> Result<bool> {
         let Shot { scene, args, .. } = &wanted.shots[number];
         let whole = Plan::new(scene, args)?.size;
         let side = |side: u32| (f64::from(side) / coarse).ceil() as u32;
@@ -271,17 +305,50 @@ impl Work {
         let plan = Plan::new(scene, &args)?;
         self.renderer(wanted, number, &plan)?;
         let orders = &self.orders;
-        let Some(renderer) = &mut self.slots[number].renderer else { return Ok(()) };
+        let Some(renderer) = &mut self.slots[number].renderer else { return Ok(true) };
         let mut picture = renderer.begin(&plan)?;
         let start = Instant::now();
         if renderer.advance(&mut picture, &mut || !(leaves && orders.is_late()))? == Step::Paused {
-            return Ok(());
+            return Ok(false);
         }
         let seen = shown(renderer, &mut picture, &wanted.shots[number], None)?;
         let ms = start.elapsed().as_secs_f64() * 1e3;
-        self.slots[number].stood_in = Some(wanted.shots[number].revision);
         self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
-        self.show(wanted, number, &plan, whole, &picture, seen);
+        self.show(wanted, number, &plan, true, &picture, seen);
+        let (revision, look) = (wanted.shots[number].revision, wanted.shots[number].look());
+        self.slots[number].stand_in = Some(StandIn { revision, plan, picture, look });
+        Ok(true)
+    }
+
+    /// Takes what is wanted next, where it is the same with another look: what is beside would leave the first picture as it was. The
+    /// stand-ins that are shown follow; false where nothing of the kind is wanted.
+    fn takes_look(&mut self, wanted: &mut Wanted) -> Result<bool> {
+        let revisions = |wanted: &Wanted| wanted.shots.iter().map(|shot| shot.revision).collect::<Vec<_>>();
+        let these = revisions(wanted);
+        let mut any = false;
+        while let Some(next) = self.orders.next_if(|next| revisions(next) == these && !next.moving) {
+            *wanted = next;
+            any = true;
+        }
+        for number in 0..if any { wanted.shots.len() } else { 0 } {
+            let is_whole = self.slots[number].whole.as_ref().is_some_and(|(.., picture)| picture.samples() > 0);
+            if !is_whole {
+                self.show_again(wanted, number)?;
+            }
+        }
+        Ok(any)
+    }
+
+    /// The last stand-in once more, where it is to be shown in another way.
+    fn show_again(&mut self, wanted: &Wanted, number: usize) -> Result<()> {
+        let (slot, shot) = (&mut self.slots[number], &wanted.shots[number]);
+        let (Some(renderer), Some(mut before)) = (&mut slot.renderer, slot.stand_in.take()) else { return Ok(()) };
+        if before.revision == shot.revision && before.look != shot.look() {
+            before.look = shot.look();
+            let seen = shown(renderer, &mut before.picture, shot, None)?;
+            self.show(wanted, number, &before.plan, true, &before.picture, seen);
+        }
+        self.slots[number].stand_in = Some(before);
         Ok(())
     }
 
@@ -303,29 +370,31 @@ impl Work {
             let Some(renderer) = &mut self.slots[number].renderer else { return Ok(true) };
             let start = Instant::now();
             let before = picture.samples();
-            let step = renderer.advance(&mut picture, &mut || !orders.is_late())?;
+            let step = renderer.advance(&mut picture, &mut || !orders.is_late() && start.elapsed() < TELLING)?;
             if before == 0 && step == Step::Round {
                 let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(picture.samples());
                 self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
             }
-            // The same with another look goes on from here; what is beside would leave the first picture as it was.
-            let revisions = |wanted: &Wanted| wanted.shots.iter().map(|shot| shot.revision).collect::<Vec<_>>();
-            let these = revisions(wanted);
-            let is_like = |next: &Wanted| number == 0 && revisions(next) == these && !next.moving;
-            while let Some(next) = self.orders.next_if(is_like) {
-                *wanted = next;
+            if number == 0 && self.takes_look(wanted)? {
+                // Also of a round that is under way.
                 shown = None;
             }
+            if let Some(share) = picture.share().filter(|_| number == 0 && step == Step::Paused) {
+                self.orders.tell(News::Progress(share));
+            }
             left |= self.orders.is_late();
-            // Another look is shown at once, also of a round that is under way.
             let is_due = shown.is_none_or(|shown| step != Step::Paused && shown.elapsed() > PERIOD);
             if picture.samples() > 0 && !left && (is_due || picture.is_whole()) {
                 let asked = wanted.pixel.filter(|[x, y]| number == 0 && *x < plan.size.width && *y < plan.size.height);
+                let Some(renderer) = &mut self.slots[number].renderer else { return Ok(true) };
                 let seen = self::shown(renderer, &mut picture, &wanted.shots[number], asked)?;
                 shown = Some(Instant::now());
-                self.show(wanted, number, &plan, plan.size, &picture, seen);
+                self.show(wanted, number, &plan, false, &picture, seen);
             }
             if left || picture.is_whole() {
+                if picture.samples() > 0 {
+                    self.slots[number].stand_in = None;
+                }
                 self.slots[number].whole = Some((wanted.shots[number].revision, plan, picture));
                 return Ok(!left);
             }
@@ -353,7 +422,7 @@ impl Work {
         wanted: &Wanted,
         number: usize,
         plan: &Plan,
-        whole: Size,
+        stand_in: bool,
         picture: &Refinement,
         Seen { image, legend, value, discarded }: Seen,
     ) {
@@ -367,7 +436,7 @@ impl Work {
             number,
             image: Arc::new(image),
             size: plan.size,
-            whole,
+            stand_in,
             samples: picture.samples(),
             of: match plan.budget {
                 Budget::Samples(samples) => Some(samples),

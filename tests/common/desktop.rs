@@ -225,7 +225,7 @@ impl Desktop {
     }
 
     /// As a window manager does it: the viewer ends well, and the validation layer had nothing to say.
-    pub fn close(mut self) {
+    pub fn close(self) {
         let (protocols, delete) = (self.atom("WM_PROTOCOLS"), self.atom("WM_DELETE_WINDOW"));
         let windows = self.x.query_tree(self.root).expect("a request").reply().expect("windows").children;
         for window in windows {
@@ -233,6 +233,11 @@ impl Desktop {
             self.x.send_event(false, window, EventMask::NO_EVENT, event).expect("a request");
         }
         self.x.flush().expect("an event");
+        self.ends();
+    }
+
+    /// The viewer ends well, after what was done to it.
+    pub fn ends(mut self) {
         let start = Instant::now();
         while self.viewer.try_wait().expect("a state").is_none() {
             assert!(start.elapsed() < Duration::from_secs(30), "it does not close");

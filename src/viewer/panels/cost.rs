@@ -55,18 +55,29 @@ fn error(ui: &mut Ui, session: &Session) {
     }
     match cost.error.filter(|(of, _)| *of == revision) {
         Some((_, measured)) => {
-            let label = ui.label(format!("95 % of the pixels are within {:.1e}", measured.error));
+            let label = ui.label(format!("95 % of the pixels are within {}", short(measured.error)));
             label.on_hover_text("|x - r| / (r + 0.1), each channel for itself, against a reference that converges");
             let (model, samples) = (measured.model.name(), measured.samples);
-            let noise =
-                if measured.noise > 0.0 { format!(", itself within {:.1e}", measured.noise) } else { String::new() };
-            one_line(ui, format!("of {model}, {samples} samples{noise}"));
+            let noise = match measured.noise > 0.0 {
+                true => format!(", itself within {}", short(measured.noise)),
+                false => String::new(),
+            };
+            one_line(ui, format!("of {model}, {}{noise}", counted(samples)));
         }
         None => {
             ui.label("measuring how far off this is ...");
             one_line(ui, String::new());
         }
     }
+}
+
+/// An error with two digits.
+fn short(error: f64) -> String {
+    if (0.01..10.0).contains(&error) { format!("{error:.2}") } else { format!("{error:.1e}") }
+}
+
+fn counted(samples: u32) -> String {
+    if samples == 1 { "1 sample".into() } else { format!("{samples} samples") }
 }
 
 /// Text that takes one line, however long it is.
@@ -109,7 +120,9 @@ fn targets(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         return;
     };
     let (name, samples, ms, error) = (best.model.name(), best.samples, best.ms, best.error);
-    one_line(ui, format!("{name}, {samples} samples: {ms:.0} ms, expected within {error:.1e}"));
+    let time = if ms < 1e3 { format!("{ms:.0} ms") } else { format!("{:.1} s", ms * 1e-3) };
+    one_line(ui, format!("{name}, {}: {time}", counted(samples)));
+    one_line(ui, format!("95 % of the pixels expected within {}", short(error)));
     session.cost.applied = Some(asked);
     let RenderArgs { model, samples, max_depth, tolerance, .. } = best.args;
     let args = &mut session.state.args;
@@ -143,16 +156,20 @@ fn offers(ui: &mut Ui, session: &Session) {
     let plot = plot.allow_scroll(false).allow_drag(false).allow_zoom(false);
     let here = session.cost.error.filter(|(of, _)| *of == revision).map(|(_, measured)| measured.error);
     let picture = session.state.pictures[0].as_ref();
-    let ms = picture.filter(|picture| picture.size == picture.whole).and_then(|picture| {
+    let ms = picture.filter(|picture| !picture.stand_in).and_then(|picture| {
         let one: Option<f64> = picture.passes.iter().map(|pass| pass.gpu_ms).sum();
         Some(one? / f64::from(picture.samples) * f64::from(picture.of.unwrap_or(picture.samples)))
     });
     plot.show(ui, |plot| {
-        for (model, curve) in offers.curves(MOST_MS) {
+        for (model, depth, curve) in offers.curves(MOST_MS) {
             let points: Vec<_> = curve.into_iter().map(log).collect();
             // Named where it begins.
             if let Some(&[x, y]) = points.first() {
-                let name = egui::RichText::new(model.name()).small().color(color(model));
+                let name = match depth {
+                    Some(depth) => format!("{} {depth}", model.name()),
+                    None => model.name().into(),
+                };
+                let name = egui::RichText::new(name).small().color(color(model));
                 let side = if model.traces() { Align2::RIGHT_TOP } else { Align2::LEFT_TOP };
                 plot.text(Text::new(model.name(), PlotPoint::new(x, y), name).anchor(side));
             }

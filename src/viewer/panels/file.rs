@@ -15,8 +15,11 @@ pub(super) fn file(ui: &mut Ui, session: &mut Session) {
     });
     ui.small("drop a scene, a mesh or an environment on the window to open it");
     ui.horizontal(|ui| {
-        if ui.button("Reload").clicked() {
+        if ui.button("Reload").on_hover_text("reads the files again; what was changed here stays").clicked() {
             session.actions.push(Action::Reload);
+        }
+        if ui.button("Revert").on_hover_text("camera, materials and environment as the file has them").clicked() {
+            session.actions.push(Action::Revert);
         }
         let button = ui.button("Copy command");
         if button.on_hover_ui(|ui| drop(ui.label(state.command()))).clicked() {

@@ -104,12 +104,15 @@ fn opaque(ui: &mut Ui, opaque: &mut Opaque) -> bool {
 
 /// A linear colour from 0 to 1.
 fn color(ui: &mut Ui, color: &mut DVec3) -> bool {
-    let mut rgb = color.as_vec3().to_array();
-    let changed = ui.color_edit_button_rgb(&mut rgb).changed();
-    if changed {
-        *color = DVec3::from_array(rgb.map(|value| f64::from(value.clamp(0.0, 1.0))));
+    let before = color.as_vec3().to_array();
+    let mut rgb = before;
+    ui.color_edit_button_rgb(&mut rgb);
+    // It comes back from other colour spaces, rounded: what was not touched stays as it is.
+    let is_moved = rgb.iter().zip(before).any(|(now, before)| (now - before).abs() > 1e-4);
+    if is_moved {
+        *color = DVec3::from_array(rgb.map(|value| (f64::from(value.clamp(0.0, 1.0)) * 1e4).round() * 1e-4));
     }
-    changed
+    is_moved
 }
 
 /// The controls of the original's debug window.

@@ -19,15 +19,16 @@ use crate::gpu::Placed;
 use crate::options::Size;
 use crate::scene::{Bounds, Scene};
 
-/// Steps of flight a second.
-const FLIGHT: f64 = 20.0;
+/// Steps of flight a second, and how many times less they are with Shift.
+const FLIGHT: f64 = 10.0;
+const SLOW: f64 = 5.0;
 
 /// How wide a column of windows is, and how far from the edge.
 const WIDTH: f32 = 252.0;
 const MARGIN: f32 = 10.0;
 
 /// The height of a window that is folded, with the gap below.
-const FOLDED: f32 = 38.0;
+const FOLDED: f32 = 42.0;
 
 /// All of them, around the picture.
 pub(super) fn all(ui: &mut Ui, session: &mut Session) -> Edits {
@@ -42,7 +43,7 @@ pub(super) fn all(ui: &mut Ui, session: &mut Session) -> Edits {
     let mut right = Column::new(&context, area.right() - MARGIN - WIDTH, 4);
     right.window("Render", roomy, |ui| render::render(ui, session, &mut edits));
     right.window("File", false, |ui| file::file(ui, session));
-    session.cost.is_open = right.window("Cost", false, |ui| cost::cost(ui, session, &mut edits));
+    session.cost.is_open = right.window("Cost", session.cost.opens, |ui| cost::cost(ui, session, &mut edits));
     let was_open = session.pixel.is_open;
     session.pixel.is_open = right.window("Pixel", false, |ui| pixel::pixel(ui, session, &mut edits));
     edits.look |= session.pixel.is_open && !was_open && session.pixel.pixel.is_some();
@@ -77,7 +78,7 @@ impl<'c> Column<'c> {
     fn window(&mut self, title: &'static str, open: bool, content: impl FnOnce(&mut Ui)) -> bool {
         self.left -= 1;
         let bottom = self.context.content_rect().bottom() - MARGIN - self.left as f32 * FOLDED;
-        let most = (bottom - self.y - FOLDED).max(40.0);
+        let most = (bottom - self.y - FOLDED - 6.0).max(40.0);
         let window = Window::new(title).fixed_pos(pos2(self.x, self.y)).default_open(open).resizable(false);
         let window = window.auto_sized().max_width(WIDTH);
         let shown = window.show(self.context, |ui| {
@@ -191,13 +192,16 @@ fn camera(ui: &Ui, response: &Response, session: &mut Session, height: f32, edit
         edits.scene = true;
     }
     let typing = ui.ctx().egui_wants_keyboard_input();
+    // With others they are something else's.
+    let typing = typing || ui.input(|input| input.modifiers.command || input.modifiers.alt);
     let pressed = |key| !typing && ui.input(|input| input.key_pressed(key));
     let held = |key| !typing && ui.input(|input| input.key_down(key));
+    let flight = if shift { FLIGHT / SLOW } else { FLIGHT };
     for (key, steps) in [(Key::W, 1.0), (Key::S, -1.0)] {
         if held(key) {
             // As fast whatever the pictures take.
             let time = f64::from(ui.input(|input| input.stable_dt)).min(0.1);
-            state.drag(|camera| orbit::fly(camera, steps * FLIGHT * time));
+            state.drag(|camera| orbit::fly(camera, steps * flight * time));
             ui.ctx().request_repaint();
             edits.scene = true;
         }

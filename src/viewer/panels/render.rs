@@ -4,10 +4,11 @@ use egui::{ComboBox, DragValue, Grid, Ui};
 
 use super::super::session::Session;
 use super::super::state::{Beside, Edits, Shows, State};
+use super::super::worker::Picture;
 use super::slider;
 use crate::choice::TOLERANCE;
 use crate::effects::Effect;
-use crate::options::{Model, RenderArgs, Tonemap};
+use crate::options::{MOST_SAMPLES, Model, RenderArgs, Tonemap};
 use crate::plan::{DEPTH, DEPTH_OF_TOLERANCE};
 
 pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
@@ -30,7 +31,7 @@ pub(super) fn render(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
         ui.end_row();
         ui.label("Samples");
         let mut samples = state.args.samples.unwrap_or(if now == Model::Path { 256 } else { 16 });
-        if ui.add(DragValue::new(&mut samples).range(1..=65536)).changed() {
+        if ui.add(DragValue::new(&mut samples).range(1..=MOST_SAMPLES)).changed() {
             state.args.samples = Some(samples);
             edits.model = true;
         }
@@ -166,19 +167,39 @@ fn effects(ui: &mut Ui, session: &mut Session, edits: &mut Edits) {
     }
 }
 
+/// Lines that what is said of the picture has at least: what is below does not move with each of them.
+const LINES: f32 = 36.0;
+
 fn progress(ui: &mut Ui, session: &Session) {
-    let Some(picture) = &session.state.pictures[0] else { return };
+    let state = &session.state;
+    let Some(picture) = &state.pictures[0] else { return };
     ui.separator();
-    let of = picture.of.map_or(String::new(), |of| format!(" of {of}"));
-    ui.label(match picture.size != picture.whole {
-        true => format!("stand-in, {}", picture.size),
-        false => format!("{}: {}{of} samples", picture.size, picture.samples),
+    ui.vertical(|ui| {
+        ui.set_min_height(LINES);
+        let share = state.progress.map_or(String::new(), |share| format!("; {:.0} %", 100.0 * share));
+        ui.label(format!("{}{share}", made(picture)));
+        if let Some(legend) = picture.legend {
+            let ends = format!("black {}, pale yellow {}", legend.low, legend.high);
+            ui.small(format!("{}: {ends}", state.shows.name()));
+        }
+        for lacking in &picture.lacks {
+            ui.small(lacking);
+        }
     });
-    if let Some(legend) = picture.legend {
-        let ends = format!("black {}, pale yellow {}", legend.low, legend.high);
-        ui.small(format!("{}: {ends}", session.state.shows.name()));
-    }
-    for lacking in &picture.lacks {
+    let Some((beside, other)) = state.beside.as_ref().zip(state.pictures[1].as_ref()) else { return };
+    ui.label(format!("{}: {}", beside.name, made(other)));
+    for lacking in &other.lacks {
         ui.small(lacking);
+    }
+}
+
+/// What a picture is.
+fn made(picture: &Picture) -> String {
+    let Picture { size, samples, stand_in, .. } = picture;
+    let of = picture.of.map_or(String::new(), |of| format!(" of {of}"));
+    let unit = if picture.of.unwrap_or(*samples) == 1 { "sample" } else { "samples" };
+    match stand_in {
+        true => format!("stand-in, {size}"),
+        false => format!("{size}: {samples}{of} {unit}"),
     }
 }
