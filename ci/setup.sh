@@ -8,7 +8,8 @@
 # On other systems it says what is missing. Everything goes through apt; the mirror is the one that apt already uses.
 #
 # shaderc ends up as one whole library in a cache ($VITRUM_CACHE, by default ~/.cache/vitrum) that outlives the checkout;
-# .native/shaderc in the checkout points there, and .cargo/config.toml points cargo at .native/shaderc.
+# .native/shaderc in the checkout points there, and .cargo/config.toml points cargo at .native/shaderc. Two more drivers
+# for the tests are unpacked there too, not installed.
 set -euo pipefail
 
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -169,6 +170,46 @@ install_shaderc() {
     ln -sfn "$kept" "$root/.native/shaderc"
 }
 
+# ---- other drivers --------------------------------------------------------------------------------------------------
+
+# Unpacks the library and the manifest of a driver into the cache, beside what is installed: package[/suite], a pattern for
+# the files, a name. .native/drivers/NAME.json is then for VK_DRIVER_FILES.
+unpack_driver() {
+    local package=$1 pattern=$2 name=$3 deb kept manifest library
+    deb=$(apt-get download --print-uris "$package" 2>/dev/null | awk '{ print $2; exit }')
+    [ -n "$deb" ] || { say "no package $package here: tests on $name are left out"; return; }
+    kept=$cache/drivers/${deb%.deb}
+    if [ ! -e "$kept/complete" ]; then
+        say "fetching the driver $name"
+        (cd "$work" && apt-get download -qq "$package" >/dev/null 2>&1) || { say "cannot download $package: tests on $name are left out"; return; }
+        rm -rf "$kept"
+        mkdir -p "$kept"
+        dpkg-deb --fsys-tarfile "$work"/"${package%%/*}"_*.deb | tar -x -C "$kept" --wildcards "$pattern"
+        touch "$kept/complete"
+    fi
+    library=$(find "$kept" -name '*.so' | head -n 1)
+    manifest=$(find "$kept" -name '*.json' ! -name '*i686*' | head -n 1)
+    if [ -z "$library" ] || [ -z "$manifest" ] || ldd "$library" | grep -q 'not found'; then
+        say "$name does not load here: tests on it are left out"
+        return
+    fi
+    sed 's|"library_path": *"[^"]*"|"library_path": "'"$library"'"|' "$manifest" >"$root/.native/drivers/$name.json"
+}
+
+# Two more software drivers, so that pictures are held against each other: lavapipe of the release itself, which has no ray
+# query where that is old, and the SwiftShader that Chromium carries.
+install_drivers() {
+    mkdir -p "$root/.native/drivers"
+    rm -f "$root"/.native/drivers/*.json
+    local codename
+    codename=$(. /etc/os-release && printf '%s' "${VERSION_CODENAME-}")
+    refresh_unless_known chromium-common
+    unpack_driver "mesa-vulkan-drivers/$codename" '*lvp*' lavapipe-of-release
+    unpack_driver chromium-common '*vk_swiftshader*' swiftshader
+}
+
+refresh_unless_known() { apt-cache show "$1" >/dev/null 2>&1 || refresh; }
+
 # ---- Rust -----------------------------------------------------------------------------------------------------------
 
 install_rust() {
@@ -203,4 +244,5 @@ install build-essential pkg-config ca-certificates libvulkan1 vulkan-validationl
 install_lavapipe
 install_rust
 install_shaderc
+install_drivers
 say "ready"

@@ -52,8 +52,10 @@ void main()
 {
     Placed place = placed[instanceIndex];
     ivec2 pixel = ivec2(gl_FragCoord.xy);
-    uint front = texelFetch(fronts, pixel, 0).x;
-    uint back = texelFetch(backs, pixel, 0).x;
+    // Helper invocations beside the instance's texels see there what nobody wrote.
+    ivec2 texel = clamp(pixel, place.first, place.last);
+    uint front = texelFetch(fronts, texel, 0).x;
+    uint back = texelFetch(backs, texel, 0).x;
     bool isClosed = place.closed != 0;
     if (front == 0 && (back == 0 || isClosed)) discard;
 

@@ -97,28 +97,107 @@ impl OutputFile {
     pub fn write_with(&self, write: impl FnOnce(&mut File) -> io::Result<()>) -> Result<()> {
         let replace = || {
             let mut temporary = self.temporary()?;
-            write(temporary.as_file_mut())?;
-            temporary.as_file_mut().flush()?;
+            let file = temporary.file();
+            write(file)?;
+            file.flush()?;
             if let Ok(old) = fs::metadata(&self.target) {
-                temporary.as_file().set_permissions(old.permissions())?;
+                file.set_permissions(old.permissions())?;
             }
-            temporary.as_file().sync_all()?;
-            temporary.persist(&self.target).map_err(|error| error.error)
+            file.sync_all()?;
+            temporary.put(&self.target)
         };
-        replace().map(|_| ()).map_err(|source| Error::file(&self.path, "write", source))
+        replace().map_err(|source| Error::file(&self.path, "write", source))
     }
 
-    /// A file beside the target that vanishes unless it is put in place.
-    fn temporary(&self) -> io::Result<tempfile::NamedTempFile> {
-        let mut builder = tempfile::Builder::new();
-        builder.prefix(".vitrum-").suffix(".part");
-        #[cfg(unix)]
-        {
-            use std::os::unix::fs::PermissionsExt;
-            // Less the umask, as any other file.
-            builder.permissions(fs::Permissions::from_mode(0o666));
+    /// A file on the target's file system that vanishes unless it is put in place.
+    fn temporary(&self) -> io::Result<Temporary> {
+        let folder = folder_of(&self.target);
+        #[cfg(target_os = "linux")]
+        if let Some(file) = unnamed::open(folder) {
+            return Ok(Temporary::Unnamed(file));
         }
-        builder.tempfile_in(folder_of(&self.target))
+        named(folder).map(Temporary::Named)
+    }
+}
+
+/// A file that is written and not yet in place.
+enum Temporary {
+    /// Without a name: nothing is left of it even where the program is killed.
+    #[cfg(target_os = "linux")]
+    Unnamed(File),
+    Named(tempfile::NamedTempFile),
+}
+
+impl Temporary {
+    fn file(&mut self) -> &mut File {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Unnamed(file) => file,
+            Self::Named(file) => file.as_file_mut(),
+        }
+    }
+
+    fn put(self, target: &Path) -> io::Result<()> {
+        match self {
+            #[cfg(target_os = "linux")]
+            Self::Unnamed(file) => unnamed::put(&file, target),
+            Self::Named(file) => file.persist(target).map(drop).map_err(|error| error.error),
+        }
+    }
+}
+
+/// A file in `folder` that vanishes when it is dropped.
+fn named(folder: &Path) -> io::Result<tempfile::NamedTempFile> {
+    let mut builder = tempfile::Builder::new();
+    builder.prefix(".vitrum-").suffix(".part");
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt;
+        // Less the umask, as any other file.
+        builder.permissions(fs::Permissions::from_mode(0o666));
+    }
+    builder.tempfile_in(folder)
+}
+
+#[cfg(target_os = "linux")]
+mod unnamed {
+    use std::fs::{self, File};
+    use std::io;
+    use std::os::fd::AsRawFd;
+    use std::path::Path;
+
+    use rustix::fs::{AtFlags, CWD, Mode, OFlags, linkat, open as open_file};
+
+    /// A file in `folder` without a name, where the file system has such.
+    pub(super) fn open(folder: &Path) -> Option<File> {
+        // Names come by way of /proc.
+        let flags = OFlags::TMPFILE | OFlags::RDWR | OFlags::CLOEXEC;
+        let file = open_file(folder, flags, Mode::from_raw_mode(0o666)).ok()?;
+        Path::new("/proc/self/fd").is_dir().then(|| file.into())
+    }
+
+    /// Gives the file its name, in the place of what has it.
+    pub(super) fn put(file: &File, target: &Path) -> io::Result<()> {
+        let itself = format!("/proc/self/fd/{}", file.as_raw_fd());
+        let link = |name: &Path| linkat(CWD, &*itself, CWD, name, AtFlags::SYMLINK_FOLLOW);
+        match link(target) {
+            Err(rustix::io::Errno::EXIST) => {}
+            linked => return Ok(linked?),
+        }
+        // A name cannot be taken from another file; it can be moved to. Whoever is killed between leaves a whole file.
+        let folder = super::folder_of(target);
+        loop {
+            let name = folder.join(format!(".vitrum-{:016x}.part", fastrand::u64(..)));
+            match link(&name) {
+                Err(rustix::io::Errno::EXIST) => {}
+                linked => {
+                    linked?;
+                    return fs::rename(&name, target).inspect_err(|_| {
+                        let _ = fs::remove_file(&name);
+                    });
+                }
+            }
+        }
     }
 }
 
