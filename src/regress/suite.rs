@@ -57,7 +57,17 @@ pub struct Driver {
     pub why: String,
     /// Pictures that it is known to get wrong, and why.
     pub faults: Vec<Fault>,
+    /// Pictures that may be further off there, the first that fits counts.
+    allowances: Vec<Allowance>,
     limits: ByKind,
+}
+
+/// How far off some pictures may be on a driver.
+#[derive(Clone, Debug)]
+struct Allowance {
+    /// Parts of their names.
+    pictures: Vec<String>,
+    limits: Limits,
 }
 
 /// A picture that a driver is known to get wrong.
@@ -121,10 +131,13 @@ impl Suite {
         self.drivers.iter().find(|known| device.contains(&known.name) || driver.contains(&known.name))
     }
 
-    /// How close `picture` has to be on a driver: what the picture says, else what the driver says, else what the suite says.
+    /// How close `picture` has to be on a driver: what is allowed of it there, else what the picture says, else what the driver says, else
+    /// what the suite says.
     pub fn limits(&self, picture: &Picture, driver: Option<&Driver>, is_random: bool) -> Limits {
         let of = |kind: &ByKind| if is_random { kind.random.clone() } else { kind.exact.clone() };
-        let own = picture.limits.clone();
+        let fits = |allowance: &&Allowance| allowance.pictures.iter().any(|part| picture.name.contains(part));
+        let allowed = driver.and_then(|driver| driver.allowances.iter().find(fits));
+        let own = allowed.map(|allowance| allowance.limits.clone()).or_else(|| picture.limits.clone());
         own.or_else(|| driver.and_then(|driver| of(&driver.limits)))
             .or_else(|| of(&self.limits))
             .unwrap_or_else(|| Limits::default_of(is_random))
@@ -161,7 +174,7 @@ impl Picture {
         if let Some((_, what)) = refused.iter().find(|(is, _)| *is) {
             return Err(table.error(format!("picture {text:?}: its options hold {what}; leave that out")));
         }
-        let limits = table.get("limits").map(limits).transpose()?;
+        let limits = table.get("limits").map(limits_of).transpose()?;
         let why = table.require("why")?.text("what the picture is there for")?;
         Ok(Self { name: text.into(), scene, options, why: why.into(), limits })
     }
@@ -169,7 +182,7 @@ impl Picture {
 
 impl Driver {
     fn read(entry: Entry<'_>, pictures: &[Picture]) -> Result<Self> {
-        let table = entry.table("[driver]", &["name", "why", "limits", "fault"])?;
+        let table = entry.table("[driver]", &["name", "why", "limits", "allowance", "fault"])?;
         let name = table.require("name")?.text("a part of the name of a driver or device")?;
         let why = table.require("why")?.text("why it differs")?;
         let limits = table.or("limits", ByKind::default(), by_kind)?;
@@ -184,17 +197,30 @@ impl Driver {
             Ok(Fault { picture: name.into(), why: why.into() })
         };
         let faults = table.or("fault", Vec::new(), |entry| entry.tables()?.into_iter().map(fault).collect())?;
-        Ok(Self { name: name.into(), why: why.into(), faults, limits })
+        let allowance = |entry: Entry<'_>| -> Result<Allowance> {
+            let table = entry.table("[driver.allowance]", &["pictures", "limits", "why"])?;
+            let parts = table.require("pictures")?;
+            let names = parts.texts("parts of the names of pictures, as in [\"double\"]")?;
+            if let Some(part) = names.iter().find(|part| !pictures.iter().any(|picture| picture.name.contains(**part))) {
+                return Err(parts.error(format!("pictures: no picture has {part:?} in its name")));
+            }
+            table.require("why")?.text("why they differ")?;
+            let limits = limits_of(table.require("limits")?)?;
+            Ok(Allowance { pictures: names.into_iter().map(str::to_owned).collect(), limits })
+        };
+        let allowances =
+            table.or("allowance", Vec::new(), |entry| entry.tables()?.into_iter().map(allowance).collect())?;
+        Ok(Self { name: name.into(), why: why.into(), faults, allowances, limits })
     }
 }
 
 fn by_kind(entry: Entry<'_>) -> Result<ByKind> {
     let table = entry.table("limits", &["exact", "random"])?;
-    let of = |key| table.get(key).map(limits).transpose();
+    let of = |key| table.get(key).map(limits_of).transpose();
     Ok(ByKind { exact: of("exact")?, random: of("random")? })
 }
 
-fn limits(entry: Entry<'_>) -> Result<Limits> {
+fn limits_of(entry: Entry<'_>) -> Result<Limits> {
     let names: Vec<_> = Measure::limited().map(Measure::name).collect();
     let entries = entry.table("limits", &names)?.entries();
     if entries.is_empty() {
