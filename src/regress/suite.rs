@@ -201,7 +201,8 @@ impl Driver {
             let table = entry.table("[driver.allowance]", &["pictures", "limits", "why"])?;
             let parts = table.require("pictures")?;
             let names = parts.texts("parts of the names of pictures, as in [\"double\"]")?;
-            if let Some(part) = names.iter().find(|part| !pictures.iter().any(|picture| picture.name.contains(**part))) {
+            if let Some(part) = names.iter().find(|part| !pictures.iter().any(|picture| picture.name.contains(**part)))
+            {
                 return Err(parts.error(format!("pictures: no picture has {part:?} in its name")));
             }
             table.require("why")?.text("why they differ")?;
