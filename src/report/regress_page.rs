@@ -12,7 +12,7 @@ code { background: #f2f2f2; padding: .1em .3em; overflow-wrap: anywhere }
 h2 { margin-bottom: .2em }
 section { border-top: 1px solid #ccc; padding-bottom: 1em }
 .bad h2 { color: #a00 }
-.views { display: grid; grid-template-columns: repeat(auto-fill, minmax(300px, 1fr)); gap: 1em }
+.views { display: grid; grid-template-columns: repeat(auto-fill, minmax(230px, 1fr)); gap: 1em }
 figure { margin: 0 }
 figure img, .pair { width: 100%; display: block; image-rendering: pixelated; background: #000 }
 figcaption { font-size: 13px }
