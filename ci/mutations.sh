@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Does the regression suite see what it is there for? Plants one fault after the other in a copy of the shaders, renders the
-# suite with each, and says which pictures saw it. A fault takes about two minutes; the checkout stays as it is.
+# suite with each, and says which pictures saw it. A fault takes minutes, the first one a build of everything; the checkout stays
+# as it is.
 #
 #   ci/mutations.sh            all
 #   ci/mutations.sh fresnel    those with this in their names

@@ -218,9 +218,8 @@ impl Run<'_> {
         for file in scene.files.iter().chain((!self.wishes.blesses).then_some(&path)) {
             hasher.update(&std::fs::read(file).unwrap_or_default());
         }
-        let DeviceInfo { name, driver, api, .. } = self.device;
-        let expected = self.suite.driver(name, driver);
-        let rest = (SCHEMA, &picture.name, &plan.options, &limits, self.wishes.blesses, name, driver, api, expected);
+        let DeviceInfo { name, driver: of, api, .. } = self.device;
+        let rest = (SCHEMA, &picture.name, &plan.options, &limits, self.wishes.blesses, name, of, api, driver);
         hasher.update(format!("{rest:?}").as_bytes());
         let fingerprint = format!("{:032x}", hasher.digest128());
         Ok(Ready { scene, plan, is_random, limits, options, reference, fingerprint })

@@ -18,6 +18,8 @@ pub const SCHEMA: u32 = 1;
 pub struct Suite {
     /// The file.
     pub path: PathBuf,
+    /// Of its content.
+    pub hash: String,
     /// The folder of the references.
     pub references: PathBuf,
     /// The pictures, in the order of the file.
@@ -97,23 +99,21 @@ impl Suite {
         let references = root.or("references", "references", |entry| entry.text("the name of a folder"))?;
         let common = root.or("render", RenderArgs::default(), |entry| options(entry, "render", Files::Disk, folder))?;
         let limits = root.or("limits", ByKind::default(), by_kind)?;
-        let pictures: Vec<Picture> = root
-            .require("picture")?
-            .tables()?
-            .into_iter()
-            .map(|entry| Picture::read(entry, folder, &common))
-            .collect::<Result<_>>()?;
-        for (number, entry) in root.require("picture")?.tables()?.into_iter().enumerate() {
-            if let Some(before) = pictures[..number].iter().find(|before| before.name == pictures[number].name) {
-                return Err(entry.error(format!("two pictures have the name {:?}; give each its own", before.name)));
+        let mut pictures: Vec<Picture> = Vec::new();
+        for entry in root.require("picture")?.tables()? {
+            let picture = Picture::read(entry, folder, &common)?;
+            if pictures.iter().any(|before| before.name == picture.name) {
+                return Err(entry.error(format!("two pictures have the name {:?}; give each its own", picture.name)));
             }
+            pictures.push(picture);
         }
         let driver = |entry| Driver::read(entry, &pictures);
         let drivers = root.or("driver", Vec::new(), |entry| entry.tables()?.into_iter().map(driver).collect())?;
         if pictures.is_empty() {
             return Err(root.error("holds no [[picture]]; add one"));
         }
-        Ok(Self { path: path.into(), references: folder.join(references), pictures, drivers, limits })
+        let hash = format!("{:032x}", xxhash_rust::xxh3::xxh3_128(&bytes));
+        Ok(Self { path: path.into(), hash, references: folder.join(references), pictures, drivers, limits })
     }
 
     /// The folder that paths in the suite start from.

@@ -320,8 +320,8 @@ impl Work {
         Ok(true)
     }
 
-    /// Takes what is wanted next, where it is the same with another look: what is beside would leave the first picture as it was. The
-    /// stand-ins that are shown follow; false where nothing of the kind is wanted.
+    /// Takes what is wanted next, where it is the same with another look, and shows stand-ins with it; false where nothing of the kind is
+    /// wanted.
     fn takes_look(&mut self, wanted: &mut Wanted) -> Result<bool> {
         let revisions = |wanted: &Wanted| wanted.shots.iter().map(|shot| shot.revision).collect::<Vec<_>>();
         let these = revisions(wanted);
@@ -355,6 +355,8 @@ impl Work {
     /// The whole picture, with all its samples, shown from time to time; false where something else was wanted before its end.
     fn grow(&mut self, wanted: &mut Wanted, number: usize) -> Result<bool> {
         let kept = self.slots[number].whole.take().filter(|(revision, ..)| *revision == wanted.shots[number].revision);
+        // The time of the first round, where all of it is seen here: it pauses, to tell how far it is.
+        let mut first = kept.is_none().then_some(Duration::ZERO);
         let (plan, mut picture) = match kept {
             Some((_, plan, picture)) => (plan, picture),
             None => {
@@ -369,10 +371,10 @@ impl Work {
             let orders = &self.orders;
             let Some(renderer) = &mut self.slots[number].renderer else { return Ok(true) };
             let start = Instant::now();
-            let before = picture.samples();
             let step = renderer.advance(&mut picture, &mut || !orders.is_late() && start.elapsed() < TELLING)?;
-            if before == 0 && step == Step::Round {
-                let ms = start.elapsed().as_secs_f64() * 1e3 / f64::from(picture.samples());
+            first = first.map(|time| time + start.elapsed());
+            if let Some(time) = first.take_if(|_| step == Step::Round) {
+                let ms = time.as_secs_f64() * 1e3 / f64::from(picture.samples());
                 self.speed.entry(plan.model.name()).or_default().learn(plan.size.pixels(), ms);
             }
             if number == 0 && self.takes_look(wanted)? {

@@ -34,7 +34,7 @@ fn what_is_discarded_falls_with_the_depth() {
 
 /// What the depth costs, as figures for the documentation: the cut-off is so small that it is no part of them.
 #[test]
-#[ignore = "a measurement"]
+#[ignore = "a measurement: prints figures of docs/tree.md and checks nothing"]
 fn what_is_discarded_at_each_depth() {
     let Some(device) = Device::open() else { return };
     println!("discarded at most (share of the pixels that discard 1e-4 or more), until no pixel does");

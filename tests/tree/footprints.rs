@@ -88,7 +88,7 @@ fn a_sample_sees_what_its_pixel_sees() {
 }
 
 #[test]
-#[ignore = "a measurement"]
+#[ignore = "a measurement: prints figures of docs/tree.md and checks nothing"]
 fn what_footprints_save() {
     let Some(device) = Device::open() else { return };
     for (name, scene) in [

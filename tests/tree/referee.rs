@@ -453,7 +453,7 @@ fn signatures_tell_trees_apart() {
 
 /// How fast the referee is; run alone.
 #[test]
-#[ignore = "a measurement"]
+#[ignore = "a measurement: prints figures of docs/tree.md and checks nothing"]
 fn speed() {
     let size = Size { width: 128, height: 96 };
     for triangles in [10_000, 100_000, 1_000_000] {
