@@ -8,8 +8,8 @@
 //!
 //! [`scene`] is plain data without a Vulkan type, [`effects`] the table of what can be simulated, [`plan`] what one
 //! render does, [`gpu`] the only room with `unsafe`, [`passes`] the frame, [`image`] pixels and their files,
-//! [`compare`] metrics between two images, [`cost`] what accuracy takes, [`regress`] pictures held against references, [`report`] what is told about a render,
-//! [`commands`] what the binary offers.
+//! [`compare`] metrics between two images, [`cost`] what accuracy takes, [`regress`] pictures held against references, [`validate`]
+//! what a driver is tested with, [`report`] what is told about all of these, [`commands`] what the binary offers.
 //! [`optics`] states in 64-bit arithmetic what `shaders/` computes in 32, and [`numerics`] holds one against the other
 //! on a device.
 
@@ -35,6 +35,7 @@ pub mod regress;
 pub mod report;
 pub mod scene;
 mod shell;
+pub mod validate;
 pub mod viewer;
 
 pub use error::{Error, Result};

@@ -7,6 +7,7 @@ mod explain;
 mod numerics;
 mod regress;
 mod render;
+mod validate;
 mod view;
 
 use std::error::Error as _;
@@ -48,6 +49,8 @@ enum Command {
     Compare(compare::CompareCommand),
     /// Renders a suite of pictures and compares them with their references
     Regress(regress::RegressCommand),
+    /// Tries every pass on every Vulkan device, under the validation layer
+    Validate(validate::ValidateCommand),
     /// Holds the shaders' optics functions on a device against 64-bit arithmetic
     Numerics(numerics::NumericsCommand),
     /// Lists the Vulkan devices and what each can do
@@ -140,6 +143,7 @@ pub fn main() -> ExitCode {
         Command::Cost(command) => command.run(cli.talk),
         Command::Compare(command) => command.run(cli.talk),
         Command::Regress(command) => command.run(cli.talk),
+        Command::Validate(command) => command.run(cli.talk),
         Command::Numerics(command) => command.run(cli.talk),
         Command::Devices(command) => command.run(),
     };

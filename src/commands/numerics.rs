@@ -6,7 +6,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
-use crate::gpu::{Gpu, Instance};
+use crate::gpu::{Gpu, Instance, complaint};
 use crate::image::OutputFile;
 use crate::numerics::{FUNCTIONS, Function, Table, suite};
 use crate::options::range;
@@ -130,10 +130,7 @@ impl NumericsCommand {
                 (instance.messages(), report.verdict())
             }
         };
-        let said = messages.all().first().map(|first| {
-            let first = first.lines().next().unwrap_or_default();
-            format!("the validation layer has {} messages, the first: {first}", messages.count())
-        });
+        let said = complaint(&messages.all());
         match (verdict, said) {
             (Ok(()), None) => Ok(()),
             (Err(broken), Some(said)) => Err(Error::Check(format!("{broken}; and {said}"))),

@@ -7,7 +7,7 @@ use clap::{Args, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
-use crate::gpu::Instance;
+use crate::gpu::{Instance, complaint};
 use crate::options::range;
 use crate::regress::{Folder, Record, Report, Run, SCHEMA, Shard, Suite, Wishes, default_suite, merged};
 use crate::report::{regress_html, regress_junit, regress_summary, regress_table};
@@ -132,12 +132,8 @@ impl RegressCommand {
             pictures,
         };
         let judged = finish(&folder, &report, talk);
-        match messages.all().first() {
-            Some(first) => {
-                let first = first.lines().next().unwrap_or_default();
-                let count = messages.count();
-                judged.and(Err(Error::Check(format!("the validation layer has {count} messages, the first: {first}"))))
-            }
+        match complaint(&messages.all()) {
+            Some(said) => judged.and(Err(Error::Check(said))),
             None => judged,
         }
     }

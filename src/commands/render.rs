@@ -8,7 +8,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
 use crate::choice::{Choice, choose, with_any_model};
-use crate::gpu::{Gpu, Instance};
+use crate::gpu::{Gpu, Instance, complaint};
 use crate::image::{ImageFormat, OutputFile, encode_exr, encode_png};
 use crate::options::{MOST_DEPTH, Model, ModelChoice, RenderArgs};
 use crate::passes::{self, PIXELS_BY_STDERR, Rendered};
@@ -148,13 +148,7 @@ impl RenderCommand {
             talk.note(&note);
         }
         talk.note(&summary(output.path(), &stats));
-        match messages.all().as_slice() {
-            [] => Ok(()),
-            [first, rest @ ..] => {
-                let first = first.lines().next().unwrap_or_default();
-                Err(Error::Check(format!("the validation layer has {} messages, the first: {first}", rest.len() + 1)))
-            }
-        }
+        complaint(&messages.all()).map_or(Ok(()), |said| Err(Error::Check(said)))
     }
 
     /// What is asked for, on the command line and in the scene. A conflict that the command line has no part in is the

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::{Talk, devices, print};
-use crate::gpu::Instance;
+use crate::gpu::{Instance, complaint};
 use crate::options::RenderArgs;
 use crate::viewer::{self, Options};
 use crate::{Error, Result};
@@ -29,14 +29,8 @@ impl ViewCommand {
         let messages = viewer::run(Options { scene: self.scene, args: self.options })?;
         let all: Vec<_> = messages.iter().flat_map(|messages| messages.all()).collect();
         for message in &all {
-            talk.detail(message);
+            talk.detail(&message.text);
         }
-        match all.as_slice() {
-            [] => Ok(()),
-            [first, ..] => {
-                let line = first.lines().next().unwrap_or_default();
-                Err(Error::Check(format!("the validation layer has {} messages, the first: {line}", all.len())))
-            }
-        }
+        complaint(&all).map_or(Ok(()), |said| Err(Error::Check(said)))
     }
 }

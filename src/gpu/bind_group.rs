@@ -79,9 +79,15 @@ impl BindGroup {
             group.set = gpu.device.allocate_descriptor_sets(&info).context("vkAllocateDescriptorSets")?[0];
         }
         gpu.name(group.layout, name);
+        gpu.name(group.pool, name);
         gpu.name(group.set, name);
         group.write();
         Ok(group)
+    }
+
+    /// Lets go of the resources as if nothing used them any more: a fault, planted by [`Fault`](super::Fault).
+    pub(super) fn let_go(&mut self) {
+        self.resources.clear();
     }
 
     fn write(&self) {

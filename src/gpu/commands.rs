@@ -75,6 +75,10 @@ impl Commands {
             commands.fence = gpu.device.create_fence(&Default::default(), None).context("vkCreateFence")?;
             commands.queries = gpu.device.create_query_pool(&queries, None).context("vkCreateQueryPool")?;
         }
+        gpu.name(commands.pool, "recordings");
+        gpu.name(commands.buffer, "recording");
+        gpu.name(commands.fence, "recording is done");
+        gpu.name(commands.queries, "times of passes");
         Ok(commands)
     }
 
@@ -126,7 +130,11 @@ impl Commands {
                 let queue = self.gpu.queue.lock().unwrap_or_else(PoisonError::into_inner);
                 device.queue_submit2(*queue, &submit, self.fence).context("vkQueueSubmit2")?;
             }
-            if let Err(result) = device.wait_for_fences(&[self.fence], true, u64::MAX) {
+            let done = match self.gpu.count_submission() {
+                true => Err(vk::Result::ERROR_DEVICE_LOST),
+                false => device.wait_for_fences(&[self.fence], true, u64::MAX),
+            };
+            if let Err(result) = done {
                 let _ = device.device_wait_idle();
                 return Err(result).context("vkWaitForFences");
             }
@@ -296,7 +304,9 @@ impl<'r> Recorder<'_, 'r> {
             }
         };
         stamp(self, 2 * index);
+        self.commands.gpu.label(buffer, Some(name));
         record(self);
+        self.commands.gpu.label(buffer, None);
         stamp(self, 2 * index + 1);
     }
 

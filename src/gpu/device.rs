@@ -3,7 +3,8 @@
 use std::ffi::{CStr, CString};
 use std::mem::ManuallyDrop;
 use std::ops::Deref;
-use std::sync::{Arc, Mutex};
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::{Arc, Mutex, Weak};
 
 use ash::{ext, khr, vk};
 use gpu_allocator::AllocationSizes;
@@ -18,6 +19,19 @@ use super::{DeviceInfo, GpuError, Instance, Result};
 #[derive(Clone)]
 pub struct Gpu(Arc<Open>);
 
+/// Tells whether a device is still held.
+#[derive(Clone)]
+pub struct Witness(Weak<Open>);
+
+impl Witness {
+    /// How many hold the device, and how many bytes of its memory are held; `None`: it is gone.
+    pub fn held(&self) -> Option<(usize, u64)> {
+        let open = self.0.upgrade()?;
+        let bytes = open.lock_ledger().now;
+        Some((Arc::strong_count(&open) - 1, bytes))
+    }
+}
+
 /// What a [`Gpu`] refers to. Handles are destroyed in [`Drop`], before the fields, the instance among them.
 pub struct Open {
     pub(super) device: ash::Device,
@@ -25,6 +39,7 @@ pub struct Open {
     pub(super) queue: Mutex<vk::Queue>,
     pub(super) allocator: ManuallyDrop<Mutex<Allocator>>,
     pub(super) ledger: Mutex<Ledger>,
+    submissions: AtomicU32,
     /// The functions of acceleration structures, where there are ray queries.
     acceleration: Option<khr::acceleration_structure::Device>,
     names: Option<ext::debug_utils::Device>,
@@ -96,16 +111,20 @@ impl Gpu {
         };
         let acceleration = info.ray_query.then(|| khr::acceleration_structure::Device::new(&instance.handle, &device));
         let names = instance.validates().then(|| ext::debug_utils::Device::new(&instance.handle, &device));
-        Ok(Self(Arc::new(Open {
+        let gpu = Self(Arc::new(Open {
             device,
             queue: Mutex::new(queue),
             allocator: ManuallyDrop::new(Mutex::new(allocator)),
             ledger: Mutex::default(),
+            submissions: AtomicU32::new(0),
             acceleration,
             names,
             info,
             instance: Arc::clone(instance),
-        })))
+        }));
+        gpu.name(gpu.device.handle(), &gpu.info.name);
+        gpu.name(queue, "queue");
+        Ok(gpu)
     }
 
     /// What is known of the device.
@@ -129,9 +148,26 @@ impl Gpu {
         self.lock_ledger().peak
     }
 
+    /// Who tells, after this is gone, whether something still holds the device.
+    pub fn witness(&self) -> Witness {
+        Witness(Arc::downgrade(&self.0))
+    }
+
+    /// How often something was submitted.
+    pub fn submissions(&self) -> u32 {
+        self.submissions.load(Ordering::Relaxed)
+    }
+
     /// The longest side of an image.
     pub fn max_image_side(&self) -> u32 {
         self.info.limits.max_image_dimension2_d.min(self.info.limits.max_framebuffer_width)
+    }
+}
+
+impl Open {
+    /// Bytes of the largest heap.
+    pub(super) fn heap(&self) -> u64 {
+        self.info.memory
     }
 
     /// The name of `handle` in messages of the validation layer and in RenderDoc.
@@ -141,12 +177,26 @@ impl Gpu {
         // SAFETY: the handle belongs to this device and is alive. A name that could not be set is only missed in messages.
         let _ = unsafe { names.set_debug_utils_object_name(&info) };
     }
-}
 
-impl Open {
-    /// Bytes of the largest heap.
-    pub(super) fn heap(&self) -> u64 {
-        self.info.memory
+    /// What follows in `buffer` is of a pass, for messages of the validation layer and for RenderDoc; `None`: it is over.
+    pub(super) fn label(&self, buffer: vk::CommandBuffer, pass: Option<&str>) {
+        let Some(names) = &self.names else { return };
+        let name = pass.map(|pass| CString::new(pass).unwrap_or_default());
+        // SAFETY: the buffer is being recorded; the name outlives the call; labels are closed as often as they are opened.
+        unsafe {
+            match &name {
+                Some(name) => {
+                    names.cmd_begin_debug_utils_label(buffer, &vk::DebugUtilsLabelEXT::default().label_name(name));
+                }
+                None => names.cmd_end_debug_utils_label(buffer),
+            }
+        }
+    }
+
+    /// One more submission: whether the device is lost with it, as was wished to see what becomes of it.
+    pub(super) fn count_submission(&self) -> bool {
+        let before = self.submissions.fetch_add(1, Ordering::Relaxed);
+        self.info.handicap.lost_after.is_some_and(|most| before >= most)
     }
 }
 

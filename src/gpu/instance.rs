@@ -1,13 +1,14 @@
 //! The Vulkan instance: which devices there are, and what the validation layer says.
 
-use std::ffi::{CStr, c_char, c_void};
+use std::ffi::{CStr, c_char};
 use std::fmt;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::Arc;
 
-use ash::{ext, vk};
+use ash::{ext, khr, vk};
 use winit::raw_window_handle::HasDisplayHandle;
 
 use super::error::Context;
+use super::messages::{Messages, messenger_info};
 use super::{GpuError, Result};
 
 const VALIDATION: &CStr = c"VK_LAYER_KHRONOS_validation";
@@ -20,24 +21,15 @@ pub(super) const RAY_QUERY_EXTENSIONS: [&CStr; 3] = [
     ash::khr::deferred_host_operations::NAME,
 ];
 
-/// What the validation layer has said.
-#[derive(Debug, Default)]
-pub struct Messages(Mutex<Vec<String>>);
-
-impl Messages {
-    /// Every message so far, oldest first.
-    pub fn all(&self) -> Vec<String> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).clone()
-    }
-
-    /// How many there are.
-    pub fn count(&self) -> usize {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).len()
-    }
-
-    fn push(&self, message: String) {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(message);
-    }
+/// What the validation layer looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Watch {
+    /// Calls, lifetimes and layouts, and hazards between passes.
+    Synchronization,
+    /// What shaders do to memory, by instructions that the layer adds to them.
+    GpuAssisted,
+    /// What is allowed and yet not advised.
+    BestPractices,
 }
 
 /// The Vulkan loader, opened.
@@ -48,6 +40,17 @@ pub struct Instance {
     shows: bool,
     // Last: the functions of everything above live in its library.
     pub(super) entry: ash::Entry,
+}
+
+impl Watch {
+    fn features(self) -> &'static [vk::ValidationFeatureEnableEXT] {
+        use vk::ValidationFeatureEnableEXT as Feature;
+        match self {
+            Self::Synchronization => &[Feature::SYNCHRONIZATION_VALIDATION],
+            Self::GpuAssisted => &[Feature::GPU_ASSISTED, Feature::GPU_ASSISTED_RESERVE_BINDING_SLOT],
+            Self::BestPractices => &[Feature::BEST_PRACTICES],
+        }
+    }
 }
 
 /// What kind of device it is, from the fastest to the slowest expected.
@@ -77,6 +80,23 @@ impl fmt::Display for DeviceKind {
     }
 }
 
+/// What a device is made to lack, to see how well it is done without.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Handicap {
+    /// There are no ray queries.
+    pub no_ray_query: bool,
+    /// There is no clock.
+    pub no_timestamps: bool,
+    /// The largest buffer that shaders see has so many bytes.
+    pub buffer_bytes: Option<u32>,
+    /// The longest side of an image.
+    pub image_side: Option<u32>,
+    /// There are so many bytes of memory.
+    pub memory: Option<u64>,
+    /// It is lost while that submission, counted from 0, is executed.
+    pub lost_after: Option<u32>,
+}
+
 /// How large acceleration structures may be; zeros where a device has none.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct AccelerationLimits {
@@ -96,6 +116,7 @@ pub struct DeviceInfo {
     pub(super) limits: vk::PhysicalDeviceLimits,
     pub(super) acceleration: AccelerationLimits,
     pub(super) timestamp_bits: u32,
+    pub(super) handicap: Handicap,
     /// Position in the list of devices, for `--device`.
     pub index: usize,
     /// The device's own name.
@@ -119,7 +140,22 @@ pub struct DeviceInfo {
 impl Instance {
     /// Opens the loader; with `validation`, under the validation layer with synchronization validation.
     pub fn new(validation: bool) -> Result<Arc<Self>> {
-        Self::with_extensions(validation, &[])
+        Self::with_extensions(validation.then_some(Watch::Synchronization), &[])
+    }
+
+    /// Opens the loader under the validation layer.
+    pub fn watched(watch: Watch) -> Result<Arc<Self>> {
+        Self::with_extensions(Some(watch), &[])
+    }
+
+    /// The same, able to show pictures where nobody sees them; `None` where no driver can.
+    pub fn headless(watch: Watch) -> Result<Option<Arc<Self>>> {
+        let wanted = [khr::surface::NAME.as_ptr(), ext::headless_surface::NAME.as_ptr()];
+        match Self::with_extensions(Some(watch), &wanted) {
+            Ok(instance) => Ok(Some(instance)),
+            Err(GpuError::NoWindow(_)) => Ok(None),
+            Err(error) => Err(error),
+        }
     }
 
     /// The same, able to show pictures in windows of `display`.
@@ -127,20 +163,11 @@ impl Instance {
         let display = display.display_handle().map_err(|error| GpuError::NoWindow(error.to_string()))?;
         let extensions = ash_window::enumerate_required_extensions(display.as_raw())
             .map_err(|result| GpuError::NoWindow(format!("Vulkan has no windows here: {result}")))?;
-        Self::with_extensions(validation, extensions)
+        Self::with_extensions(validation.then_some(Watch::Synchronization), extensions)
     }
 
-    fn with_extensions(validation: bool, wanted: &[*const c_char]) -> Result<Arc<Self>> {
-        // SAFETY: the loader is the system's own library; its initialisers are those of every Vulkan program.
-        let entry = unsafe { ash::Entry::load() }.map_err(GpuError::NoLoader)?;
-        // SAFETY: no arguments.
-        let version = unsafe { entry.try_enumerate_instance_version() }
-            .context("vkEnumerateInstanceVersion")?
-            .unwrap_or(vk::API_VERSION_1_0);
-        if version < vk::API_VERSION_1_3 {
-            return Err(GpuError::OldLoader { found: version_text(version) });
-        }
-
+    fn with_extensions(watch: Option<Watch>, wanted: &[*const c_char]) -> Result<Arc<Self>> {
+        let (entry, _) = open_loader()?;
         let application = vk::ApplicationInfo::default()
             .application_name(c"vitrum")
             .engine_name(c"vitrum")
@@ -158,16 +185,11 @@ impl Instance {
         let messages = Arc::new(Messages::default());
         let mut layers = Vec::new();
         let mut messenger = messenger_info(&messages);
-        let enabled = [vk::ValidationFeatureEnableEXT::SYNCHRONIZATION_VALIDATION];
-        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(&enabled);
+        let enabled = watch.map_or(&[][..], Watch::features);
+        let mut features = vk::ValidationFeaturesEXT::default().enabled_validation_features(enabled);
         let mut info = vk::InstanceCreateInfo::default().application_info(&application);
-        if validation {
-            // SAFETY: no arguments.
-            let found =
-                unsafe { entry.enumerate_instance_layer_properties() }.context("vkEnumerateInstanceLayerProperties")?;
-            if !found.iter().any(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION)) {
-                return Err(GpuError::NoValidationLayer);
-            }
+        if watch.is_some() {
+            validation_layer(&entry)?;
             layers.push(VALIDATION.as_ptr());
             extensions.push(ext::debug_utils::NAME.as_ptr());
             extensions.push(ext::validation_features::NAME.as_ptr());
@@ -187,7 +209,7 @@ impl Instance {
         })?;
 
         let mut instance = Self { handle, debug: None, messages, shows: !wanted.is_empty(), entry };
-        if validation {
+        if watch.is_some() {
             let debug = ext::debug_utils::Instance::new(&instance.entry, &instance.handle);
             let info = messenger_info(&instance.messages);
             // SAFETY: the callback's user data is the `Messages` that this instance holds until it is destroyed.
@@ -196,6 +218,12 @@ impl Instance {
             instance.debug = Some((debug, messenger));
         }
         Ok(Arc::new(instance))
+    }
+
+    /// The versions of Vulkan that the loader and the validation layer are of. No driver is looked at.
+    pub fn versions() -> Result<[String; 2]> {
+        let (entry, version) = open_loader()?;
+        Ok([version_text(version), validation_layer(&entry)?])
     }
 
     /// What the validation layer says; it outlives the instance, so that messages of its end are seen too.
@@ -298,6 +326,7 @@ impl Instance {
                 scratch_alignment: limits.min_acceleration_structure_scratch_offset_alignment.into(),
             },
             timestamp_bits: queue_family.map_or(0, |family| families[family].timestamp_valid_bits),
+            handicap: Handicap::default(),
             index,
             name: text(properties.device_name_as_c_str()),
             driver: format!("{} {}", text(driver.driver_name_as_c_str()), text(driver.driver_info_as_c_str())),
@@ -325,8 +354,30 @@ impl Instance {
     }
 }
 
+impl DeviceInfo {
+    /// The same device with something missing.
+    #[must_use]
+    pub fn with_handicap(mut self, handicap: Handicap) -> Self {
+        let least = |limit: &mut u32, wanted: Option<u32>| *limit = wanted.map_or(*limit, |wanted| wanted.min(*limit));
+        self.ray_query &= !handicap.no_ray_query;
+        if handicap.no_timestamps {
+            self.timestamp_bits = 0;
+        }
+        least(&mut self.limits.max_storage_buffer_range, handicap.buffer_bytes);
+        least(&mut self.limits.max_image_dimension2_d, handicap.image_side);
+        self.memory = handicap.memory.map_or(self.memory, |memory| memory.min(self.memory));
+        self.handicap = handicap;
+        self
+    }
+
+    /// Whether passes can be timed.
+    pub fn has_clock(&self) -> bool {
+        self.timestamp_bits > 0
+    }
+}
+
 /// Which of the devices called `names` is meant: a number is an index and nothing else.
-fn find(wanted: &str, names: &[&str]) -> Option<usize> {
+pub(crate) fn find(wanted: &str, names: &[&str]) -> Option<usize> {
     if let Ok(index) = wanted.parse::<usize>() {
         return (index < names.len()).then_some(index);
     }
@@ -365,6 +416,28 @@ fn missing(
     missing
 }
 
+/// The loader, and the version of Vulkan that it speaks: one that is new enough.
+fn open_loader() -> Result<(ash::Entry, u32)> {
+    // SAFETY: the loader is the system's own library; its initialisers are those of every Vulkan program.
+    let entry = unsafe { ash::Entry::load() }.map_err(GpuError::NoLoader)?;
+    // SAFETY: no arguments.
+    let version = unsafe { entry.try_enumerate_instance_version() }
+        .context("vkEnumerateInstanceVersion")?
+        .unwrap_or(vk::API_VERSION_1_0);
+    if version < vk::API_VERSION_1_3 {
+        return Err(GpuError::OldLoader { found: version_text(version) });
+    }
+    Ok((entry, version))
+}
+
+/// The version of Vulkan that the validation layer is of; an error where there is none.
+fn validation_layer(entry: &ash::Entry) -> Result<String> {
+    // SAFETY: no arguments.
+    let found = unsafe { entry.enumerate_instance_layer_properties() }.context("vkEnumerateInstanceLayerProperties")?;
+    let layer = found.iter().find(|layer| layer.layer_name_as_c_str() == Ok(VALIDATION));
+    layer.map(|layer| version_text(layer.spec_version)).ok_or(GpuError::NoValidationLayer)
+}
+
 impl Drop for Instance {
     fn drop(&mut self) {
         // SAFETY: devices hold this instance, so none is left; the messenger goes before the instance that made it.
@@ -375,30 +448,6 @@ impl Drop for Instance {
             self.handle.destroy_instance(None);
         }
     }
-}
-
-fn messenger_info(messages: &Arc<Messages>) -> vk::DebugUtilsMessengerCreateInfoEXT<'static> {
-    use vk::{DebugUtilsMessageSeverityFlagsEXT as Severity, DebugUtilsMessageTypeFlagsEXT as Type};
-    vk::DebugUtilsMessengerCreateInfoEXT::default()
-        .message_severity(Severity::WARNING | Severity::ERROR)
-        .message_type(Type::VALIDATION | Type::PERFORMANCE)
-        .pfn_user_callback(Some(record))
-        .user_data(Arc::as_ptr(messages).cast_mut().cast())
-}
-
-/// Called by the layer, on whichever thread called Vulkan.
-unsafe extern "system" fn record(
-    _severity: vk::DebugUtilsMessageSeverityFlagsEXT,
-    _types: vk::DebugUtilsMessageTypeFlagsEXT,
-    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
-    messages: *mut c_void,
-) -> vk::Bool32 {
-    // SAFETY: the layer passes valid data, and `messages` is the `Messages` that the instance keeps alive.
-    let (data, messages) = unsafe { (&*data, &*messages.cast::<Messages>()) };
-    // SAFETY: the layer's text is a C string for the length of this call, or null.
-    let text = unsafe { data.message_as_c_str() };
-    messages.push(text.map_or(String::new(), |text| text.to_string_lossy().into_owned()));
-    vk::FALSE
 }
 
 fn version_text(version: u32) -> String {

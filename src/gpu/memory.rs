@@ -13,7 +13,7 @@ use super::{Gpu, GpuError, Result};
 /// Bytes held by allocations.
 #[derive(Debug, Default)]
 pub struct Ledger {
-    now: u64,
+    pub(super) now: u64,
     pub(super) peak: u64,
 }
 
@@ -50,6 +50,10 @@ impl Open {
                 allocation_scheme: AllocationScheme::GpuAllocatorManaged,
             })
             .map_err(|error| out_of_memory(format!("the driver says: {error}")))?;
+        if allocation.offset() == 0 {
+            // SAFETY: the block is alive as long as the allocation, and only named.
+            self.name(unsafe { allocation.memory() }, &format!("memory, the first in it: {name}"));
+        }
         ledger.now += allocation.size();
         ledger.peak = ledger.peak.max(ledger.now);
         Ok(allocation)

@@ -109,7 +109,7 @@ pub(super) struct Pipeline {
 
 impl Pipeline {
     /// Its layout; the pipeline itself is still missing.
-    fn new(gpu: &Gpu, group: &BindGroup, push_bytes: u32) -> Result<Self> {
+    fn new(gpu: &Gpu, name: &str, group: &BindGroup, push_bytes: u32) -> Result<Self> {
         assert!(push_bytes <= MAX_PUSH_BYTES && push_bytes.is_multiple_of(4), "{push_bytes} bytes of push constants");
         let sets = [group.layout];
         let ranges = [vk::PushConstantRange { stage_flags: PUSH_STAGES, offset: 0, size: push_bytes }];
@@ -117,6 +117,7 @@ impl Pipeline {
         let info = if push_bytes > 0 { info.push_constant_ranges(&ranges) } else { info };
         // SAFETY: the set's layout is alive, and the push constants fit, see above.
         let layout = unsafe { gpu.device.create_pipeline_layout(&info, None) }.context("vkCreatePipelineLayout")?;
+        gpu.name(layout, name);
         Ok(Self { handle: vk::Pipeline::null(), layout, kinds: group.kinds.clone(), push_bytes, gpu: gpu.clone() })
     }
 }
@@ -134,7 +135,7 @@ impl Drop for Pipeline {
 impl GraphicsPipeline {
     /// A pipeline for render passes with these targets.
     pub fn new(gpu: &Gpu, desc: &GraphicsPipelineDesc<'_>) -> Result<Self> {
-        let mut pipeline = Pipeline::new(gpu, desc.group, desc.push_bytes)?;
+        let mut pipeline = Pipeline::new(gpu, desc.name, desc.group, desc.push_bytes)?;
         let (vertex, fragment) = (Module::new(gpu, desc.vertex)?, Module::new(gpu, desc.fragment)?);
         let specialization = desc.specialization.info();
         let stage = |stage, module: &Module<'_>| {
@@ -206,7 +207,7 @@ impl ComputePipeline {
         push_bytes: u32,
         specialization: &Specialization,
     ) -> Result<Self> {
-        let mut pipeline = Pipeline::new(gpu, group, push_bytes)?;
+        let mut pipeline = Pipeline::new(gpu, shader.name, group, push_bytes)?;
         let module = Module::new(gpu, shader)?;
         let specialization = specialization.info();
         let stage = vk::PipelineShaderStageCreateInfo::default()

@@ -4,7 +4,7 @@
 
 use std::sync::{Arc, PoisonError};
 
-use ash::{khr, vk};
+use ash::{ext, khr, vk};
 use egui_ash_renderer::allocator::DefaultAllocator;
 use egui_ash_renderer::{DynamicRendering, Options, RenderMode, Renderer, RendererError};
 use winit::raw_window_handle::{HasDisplayHandle, HasWindowHandle};
@@ -52,8 +52,8 @@ pub struct Screen {
     /// Textures that the frame before may still have shown.
     freed: Vec<egui::TextureId>,
     gpu: Gpu,
-    /// Held so that it outlives the surface.
-    window: Arc<Window>,
+    /// Held so that it outlives the surface; `None` where there is no window.
+    _window: Option<Arc<Window>>,
 }
 
 /// Images to draw on, of one size.
@@ -72,7 +72,7 @@ pub struct Surface {
     surfaces: khr::surface::Instance,
     /// Both are held so that they outlive the surface.
     _instance: Arc<Instance>,
-    window: Arc<Window>,
+    window: Option<Arc<Window>>,
 }
 
 fn failed(error: RendererError) -> GpuError {
@@ -92,7 +92,17 @@ impl Surface {
         let handle = unsafe { ash_window::create_surface(&instance.entry, &instance.handle, display, handle, None) }
             .context("vkCreateSurfaceKHR")?;
         let surfaces = khr::surface::Instance::new(&instance.entry, &instance.handle);
-        Ok(Self { handle, surfaces, _instance: instance.clone(), window: window.clone() })
+        Ok(Self { handle, surfaces, _instance: instance.clone(), window: Some(window.clone()) })
+    }
+
+    /// One that nobody sees, on an instance that was made [for it](Instance::headless).
+    pub fn headless(instance: &Arc<Instance>) -> Result<Self> {
+        let functions = ext::headless_surface::Instance::new(&instance.entry, &instance.handle);
+        // SAFETY: the instance was made with this extension, or the function fails to load and is never called.
+        let handle = unsafe { functions.create_headless_surface(&Default::default(), None) }
+            .context("vkCreateHeadlessSurfaceEXT")?;
+        let surfaces = khr::surface::Instance::new(&instance.entry, &instance.handle);
+        Ok(Self { handle, surfaces, _instance: instance.clone(), window: None })
     }
 
     /// Whether `device` can show pictures here.
@@ -151,7 +161,7 @@ impl Screen {
             acquired: vk::Semaphore::null(),
             freed: Vec::new(),
             gpu: gpu.clone(),
-            window: surface.window.clone(),
+            _window: surface.window.clone(),
         };
         let mode = RenderMode::DynamicRendering(DynamicRendering {
             color_attachment_format: format.format,
@@ -168,6 +178,10 @@ impl Screen {
             screen.fence = gpu.device.create_fence(&Default::default(), None).context("vkCreateFence")?;
             screen.acquired = gpu.device.create_semaphore(&Default::default(), None).context("vkCreateSemaphore")?;
         }
+        gpu.name(screen.pool, "frames");
+        gpu.name(screen.buffer, "frame");
+        gpu.name(screen.fence, "frame is done");
+        gpu.name(screen.acquired, "image of the screen is there");
         screen.egui = Some(
             Renderer::with_default_allocator(instance, info.handle, gpu.device.clone(), mode, options)
                 .map_err(failed)?,
@@ -192,14 +206,15 @@ impl Screen {
         Ok(())
     }
 
-    /// Shows pictures, the later ones in front, and before them what egui tessellated.
+    /// Shows pictures, the later ones in front, and before them what egui tessellated. `size` is that of the window, in pixels.
     pub fn draw(
         &mut self,
+        size: [u32; 2],
         pictures: &[Placed],
         pixels_per_point: f32,
         primitives: &[egui::ClippedPrimitive],
     ) -> Result<Shown> {
-        if !self.fit()? {
+        if !self.fit(size)? {
             return Ok(Shown::Not);
         }
         let (Some(swapchain), Some(egui)) = (&self.swapchain, &mut self.egui) else { return Ok(Shown::Not) };
@@ -289,13 +304,12 @@ impl Screen {
     }
 
     /// Makes a swapchain of the window's size; false where that has no area.
-    fn fit(&mut self) -> Result<bool> {
-        let size = self.window.inner_size();
+    fn fit(&mut self, [width, height]: [u32; 2]) -> Result<bool> {
         let info = self.gpu.info();
-        if size.width == 0 || size.height == 0 {
+        if width == 0 || height == 0 {
             return Ok(false);
         }
-        if self.swapchain.as_ref().is_some_and(|s| (s.extent.width, s.extent.height) == (size.width, size.height)) {
+        if self.swapchain.as_ref().is_some_and(|s| (s.extent.width, s.extent.height) == (width, height)) {
             return Ok(true);
         }
         // SAFETY: device and surface are of one instance.
@@ -303,8 +317,8 @@ impl Screen {
             .context("vkGetPhysicalDeviceSurfaceCapabilitiesKHR")?;
         let extent = if can.current_extent.width == u32::MAX {
             vk::Extent2D {
-                width: size.width.clamp(can.min_image_extent.width, can.max_image_extent.width),
-                height: size.height.clamp(can.min_image_extent.height, can.max_image_extent.height),
+                width: width.clamp(can.min_image_extent.width, can.max_image_extent.width),
+                height: height.clamp(can.min_image_extent.height, can.max_image_extent.height),
             }
         } else {
             can.current_extent
@@ -357,6 +371,12 @@ impl Screen {
                 swapchain.views.push(device.create_image_view(&create, None).context("vkCreateImageView")?);
                 swapchain.drawn.push(device.create_semaphore(&Default::default(), None).context("vkCreateSemaphore")?);
             }
+        }
+        self.gpu.name(handle, "screen");
+        for (number, image) in swapchain.images.iter().enumerate() {
+            self.gpu.name(*image, &format!("image {number} of the screen"));
+            self.gpu.name(swapchain.views[number], &format!("image {number} of the screen"));
+            self.gpu.name(swapchain.drawn[number], &format!("image {number} of the screen is drawn"));
         }
         Ok(true)
     }

@@ -17,4 +17,5 @@ pub use reference::Reference;
 pub use run::{Run, Wishes};
 pub use suite::{Driver, Fault, Picture, SCHEMA, Suite, default_suite};
 
+pub(crate) use pictures::shown;
 pub(crate) use record::{Folder, PICTURES, merged};

@@ -12,6 +12,8 @@ mod plots;
 mod regress;
 mod regress_page;
 mod stats;
+mod validate;
+mod validate_page;
 
 pub use compare::{CompareReport, MetricValues};
 pub use cost::CostReport;
@@ -21,3 +23,5 @@ pub use picture::{float_image, metadata};
 pub use regress::{junit as regress_junit, summary as regress_summary, table as regress_table};
 pub use regress_page::html as regress_html;
 pub use stats::{BuildTimes, DeviceStats, DiscardedStats, PassStats, Run, Stats};
+pub use validate::{summary as validate_summary, table as validate_table};
+pub use validate_page::html as validate_html;

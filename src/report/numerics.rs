@@ -95,7 +95,7 @@ impl NumericsReport {
     }
 
     /// All in one line.
-    pub(super) fn summary(&self) -> String {
+    pub fn summary(&self) -> String {
         format!(
             "{} inputs, {} outputs not finite, {} of {} bounds broken",
             self.inputs(),

@@ -120,13 +120,7 @@ impl Scene {
     /// `overrides` win over the scene's `[render]` table, which wins over what its materials and environment say.
     pub fn load(path: Option<&Path>, overrides: &Overrides) -> Result<Self> {
         overrides.check()?;
-        let Some(path) = path else {
-            return Self::from_file(
-                file::read(Files::BuiltIn, Path::new(builtin::SCENE))?,
-                "built-in".into(),
-                overrides,
-            );
-        };
+        let Some(path) = path else { return Self::built_in(builtin::SCENE, "built-in", overrides) };
         let name = path.display().to_string();
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let mut scene = match extension.as_deref() {
@@ -137,6 +131,20 @@ impl Scene {
         }?;
         scene.files.push(path.into());
         Ok(scene)
+    }
+
+    /// A small scene that calls for every effect.
+    pub fn of_every_effect() -> Result<Self> {
+        Self::built_in(builtin::EVERY_EFFECT, "every effect", &Overrides::default())
+    }
+
+    /// A small scene of one body of clear glass.
+    pub fn of_clear_glass() -> Result<Self> {
+        Self::built_in(builtin::CLEAR_GLASS, "clear glass", &Overrides::default())
+    }
+
+    fn built_in(path: &str, name: &str, overrides: &Overrides) -> Result<Self> {
+        Self::from_file(file::read(Files::BuiltIn, Path::new(path))?, name.into(), overrides)
     }
 
     fn from_file(file: SceneFile, name: String, overrides: &Overrides) -> Result<Self> {

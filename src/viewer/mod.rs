@@ -244,7 +244,9 @@ impl App {
         if !waits {
             shown.name(&session.state.scene.name);
             let primitives = context.tessellate(output.shapes, output.pixels_per_point);
-            if shown.screen.draw(&session.placed, output.pixels_per_point, &primitives)? == OnScreen::Not {
+            let size = shown.window.inner_size();
+            let size = [size.width, size.height];
+            if shown.screen.draw(size, &session.placed, output.pixels_per_point, &primitives)? == OnScreen::Not {
                 let size = shown.window.inner_size();
                 if size.width > 0 && size.height > 0 {
                     shown.window.request_redraw();

@@ -53,6 +53,6 @@ impl Validated {
         let messages = self.instance.messages();
         drop(self.gpu);
         drop(self.instance);
-        messages.all()
+        messages.all().into_iter().map(|message| message.text).collect()
     }
 }

@@ -1,0 +1,74 @@
+//! What a validation run came to: a table for a terminal, and one line.
+
+use std::fmt::Write;
+
+use crate::validate::{Outcome, Record, Report, Tested};
+
+/// The table: a group of checks a line, and below it what did not pass.
+pub fn table(report: &Report, only_bad: bool) -> String {
+    let mut text = String::new();
+    for tested in &report.devices {
+        let Tested { device, checks, .. } = tested;
+        // Writing to a string cannot fail.
+        let _ = writeln!(text, "{}, {}, Vulkan {}", device.name, device.driver, device.api);
+        if !device.missing.is_empty() {
+            let _ = writeln!(text, "  cannot be used: it lacks {}", device.missing.join(", "));
+        }
+        for group in groups(checks) {
+            if !only_bad || group.checks.iter().any(|check| !check.outcome.is_good()) {
+                let seconds: f64 = group.checks.iter().map(|check| check.seconds).sum();
+                let counts = counts(group.checks.iter().map(|check| check.outcome));
+                let _ = writeln!(text, "  {:16} {seconds:7.1} s  {counts}", group.name);
+            }
+            for check in group.checks.iter().filter(|check| !check.outcome.is_good()) {
+                let _ = writeln!(text, "    {} {}", check.outcome.name(), check.name);
+                for reason in &check.reasons {
+                    let _ = writeln!(text, "      {reason}");
+                }
+            }
+            for why in why_skipped(group.checks) {
+                if !only_bad {
+                    let _ = writeln!(text, "    skipped: {why}");
+                }
+            }
+        }
+    }
+    text
+}
+
+/// One line of all.
+pub fn summary(report: &Report) -> String {
+    let usable = report.devices.iter().filter(|tested| tested.device.missing.is_empty()).count();
+    let devices = if usable == 1 { "device" } else { "devices" };
+    let (checks, messages) = (report.checks().count(), report.messages());
+    let counts = counts(report.checks().map(|(_, check)| check.outcome));
+    format!("{usable} {devices}, {checks} checks in {:.0} s: {counts}; {messages} messages", report.seconds)
+}
+
+/// Checks whose names start alike.
+pub(super) struct Group<'a> {
+    pub(super) name: &'a str,
+    pub(super) checks: &'a [Record],
+}
+
+pub(super) fn groups(checks: &[Record]) -> impl Iterator<Item = Group<'_>> {
+    let name = |check: &Record| check.name.split('/').next().unwrap_or_default().to_owned();
+    checks
+        .chunk_by(move |a, b| name(a) == name(b))
+        .map(|checks| Group { name: checks[0].name.split('/').next().unwrap_or_default(), checks })
+}
+
+/// Each reason once.
+pub(super) fn why_skipped(checks: &[Record]) -> Vec<&str> {
+    let skipped = checks.iter().filter(|check| check.outcome == Outcome::Skipped);
+    let mut all: Vec<_> = skipped.flat_map(|check| &check.reasons).map(String::as_str).collect();
+    all.dedup();
+    all
+}
+
+fn counts(outcomes: impl Iterator<Item = Outcome>) -> String {
+    let all: Vec<_> = outcomes.collect();
+    let count = |outcome: Outcome| all.iter().filter(|&&one| one == outcome).count();
+    let some = Outcome::ALL.into_iter().filter(|&outcome| count(outcome) > 0);
+    some.map(|outcome| format!("{} {}", count(outcome), outcome.name().to_lowercase())).collect::<Vec<_>>().join(", ")
+}

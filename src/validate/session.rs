@@ -1,0 +1,239 @@
+//! The surroundings of one check: devices opened under the layer, and what the layer says until they are gone.
+
+use std::path::Path;
+use std::sync::Arc;
+use std::time::Instant;
+
+use xxhash_rust::xxh3::xxh3_128;
+
+use super::known;
+use super::record::{Outcome, Picture, Record, Said};
+use crate::gpu::{Gpu, GpuError, Handicap, Instance, Messages, Watch, Witness};
+use crate::image::{FloatImage, OutputFile};
+use crate::regress::shown;
+use crate::{Error, Result};
+
+/// Why a check did not pass.
+#[derive(Debug)]
+pub enum Trouble {
+    /// What was to be seen was not.
+    Failed(String),
+    /// It cannot be done here.
+    Skipped(String),
+}
+
+impl<E: Into<Error>> From<E> for Trouble {
+    fn from(error: E) -> Self {
+        Self::Failed(error.into().in_full())
+    }
+}
+
+/// How the body of a check ends.
+pub type Verdict = Result<(), Trouble>;
+
+/// Fails with the reason, unless it holds.
+pub fn hold(holds: bool, otherwise: impl FnOnce() -> String) -> Verdict {
+    if holds { Ok(()) } else { Err(Trouble::Failed(otherwise())) }
+}
+
+/// One check on its way.
+pub struct Session<'a> {
+    device: usize,
+    folder: &'a Path,
+    watch: Watch,
+    opened: Vec<Arc<Messages>>,
+    witnesses: Vec<Witness>,
+    record: Record,
+}
+
+impl<'a> Session<'a> {
+    /// Runs `body` and tells what came of it. Pictures and what else is written go to `folder`.
+    pub fn run(
+        (name, about, watch): (&str, &str, Watch),
+        device: usize,
+        folder: &'a Path,
+        body: impl FnOnce(&mut Self) -> Verdict,
+    ) -> Record {
+        let start = Instant::now();
+        let record = Record {
+            name: name.into(),
+            about: about.into(),
+            outcome: Outcome::Passed,
+            reasons: Vec::new(),
+            facts: Vec::new(),
+            said: Vec::new(),
+            pictures: Vec::new(),
+            seconds: 0.0,
+        };
+        let mut session = Self { device, folder, watch, opened: Vec::new(), witnesses: Vec::new(), record };
+        let verdict = body(&mut session);
+        let Self { opened, witnesses, mut record, .. } = session;
+        match verdict {
+            Ok(()) => {}
+            Err(Trouble::Skipped(why)) => {
+                record.outcome = Outcome::Skipped;
+                record.reasons.push(why);
+            }
+            Err(Trouble::Failed(why)) => record.reasons.push(why),
+        }
+        for (holders, bytes) in witnesses.iter().filter_map(Witness::held) {
+            record.reasons.push(format!("{holders} things still hold the device after the check, and {bytes} bytes"));
+        }
+        for message in opened.iter().flat_map(|messages| messages.all()) {
+            match record.said.iter_mut().find(|said| said.message.is_like(&message)) {
+                Some(said) => said.times += 1,
+                None => {
+                    let allowed = known::allowed(&message, watch).map(String::from);
+                    record.said.push(Said { message, times: 1, allowed });
+                }
+            }
+        }
+        let counts: usize = record.said.iter().filter(|said| said.allowed.is_none()).map(|said| said.times).sum();
+        if let Some(first) = record.said.iter().find(|said| said.allowed.is_none()) {
+            let first = first.message.text.lines().next().unwrap_or_default();
+            record.reasons.push(format!("the validation layer has {counts} messages, the first: {first}"));
+        }
+        // One that was skipped has its reason alone.
+        let is_more = record.reasons.len() > usize::from(record.outcome == Outcome::Skipped);
+        if let Some(why) = record.said.iter().find_map(|said| known::unable(&said.message)) {
+            (record.outcome, record.reasons) = (Outcome::Skipped, vec![why]);
+        } else if is_more {
+            record.outcome = Outcome::Failed;
+        }
+        record.seconds = start.elapsed().as_secs_f64();
+        record
+    }
+
+    /// The device, opened under the layer of this check.
+    pub fn open(&mut self) -> Result<Gpu> {
+        self.open_with(Handicap::default())
+    }
+
+    /// The same with something missing.
+    pub fn open_with(&mut self, handicap: Handicap) -> Result<Gpu> {
+        let instance = Instance::watched(self.watch)?;
+        self.open_in(&instance, handicap)
+    }
+
+    /// The same of an instance made for something special.
+    pub fn open_in(&mut self, instance: &Arc<Instance>, handicap: Handicap) -> Result<Gpu> {
+        self.opened.push(instance.messages());
+        let info = instance.devices()?.into_iter().nth(self.device).ok_or(GpuError::NoDevice)?;
+        let gpu = Gpu::open(instance, info.with_handicap(handicap))?;
+        self.witnesses.push(gpu.witness());
+        Ok(gpu)
+    }
+
+    /// The index of the device.
+    pub fn device(&self) -> usize {
+        self.device
+    }
+
+    /// What is looked at.
+    pub fn watch(&self) -> Watch {
+        self.watch
+    }
+
+    /// Where a check may write.
+    pub fn folder(&self) -> &Path {
+        self.folder
+    }
+
+    /// Something worth knowing.
+    pub fn fact(&mut self, fact: impl Into<String>) {
+        self.record.facts.push(fact.into());
+    }
+
+    /// What the layer said of a planted fault: wanted, and no trouble.
+    pub fn expected(&mut self, said: impl IntoIterator<Item = Said>) {
+        self.record.said.extend(said);
+    }
+
+    /// Keeps a picture as evidence.
+    pub fn keep(&mut self, name: &str, image: &FloatImage) -> Result<()> {
+        let file = format!("{}{name}.png", self.record.name.replace('/', "-"));
+        let path = self.folder.join(&file);
+        let bytes = shown(image, image).map_err(|source| Error::file(&path, "write", source))?;
+        OutputFile::new(&path)?.write(&bytes)?;
+        let hash = format!("{:032x}", xxh3_128(bytemuck::cast_slice(&image.pixels)));
+        let size = [image.width, image.height];
+        self.record.pictures.push(Picture { name: name.into(), size, hash, file });
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{Buffer, BufferDesc, BufferUse, Commands};
+
+    /// What comes of `body` on the first device; `None` where there is none.
+    fn run(body: impl FnOnce(&mut Session<'_>) -> Verdict) -> Option<Record> {
+        let has = Instance::watched(Watch::Synchronization).and_then(|instance| instance.choose(Some("0"))).is_ok();
+        assert!(has || std::env::var_os("VITRUM_REQUIRE_DEVICE").is_none(), "no device");
+        let folder = tempfile::tempdir().expect("a folder");
+        has.then(|| Session::run(("a check", "", Watch::Synchronization), 0, folder.path(), body))
+    }
+
+    fn buffer(gpu: &Gpu, name: &str, usage: BufferUse) -> Result<Buffer> {
+        Ok(Buffer::new(gpu, &BufferDesc { name, size: 64, usage })?)
+    }
+
+    #[test]
+    fn what_is_right_passes() {
+        let Some(record) = run(|session| {
+            buffer(&session.open()?, "right", BufferUse::Storage)?;
+            Ok(())
+        }) else {
+            return;
+        };
+        assert_eq!((record.outcome, record.said.len()), (Outcome::Passed, 0), "{record:?}");
+    }
+
+    #[test]
+    fn what_is_left_on_the_device_fails() {
+        let Some(record) = run(|session| {
+            std::mem::forget(buffer(&session.open()?, "left", BufferUse::Storage)?);
+            Ok(())
+        }) else {
+            return;
+        };
+        assert_eq!(record.outcome, Outcome::Failed);
+        assert!(record.reasons[0].contains("still hold the device"), "{record:?}");
+    }
+
+    #[test]
+    fn what_the_layer_says_fails_and_is_counted_once() {
+        let Some(record) = run(|session| {
+            let gpu = session.open()?;
+            let mut commands = Commands::new(&gpu)?;
+            // Read from while it was made to be written to alone.
+            let (from, to) = (buffer(&gpu, "wrong", BufferUse::Readback)?, buffer(&gpu, "to", BufferUse::Readback)?);
+            for _ in 0..2 {
+                commands.run(|cmd| cmd.timed("a pass", |cmd| cmd.copy_buffer(&from, &to)))?;
+            }
+            Ok(())
+        }) else {
+            return;
+        };
+        assert_eq!(record.outcome, Outcome::Failed);
+        let said = record.said.iter().find(|said| said.message.names("wrong")).expect("it is named");
+        assert_eq!((said.times, &said.message.passes[..]), (2, &["a pass".to_owned()][..]), "{record:?}");
+        assert!(record.reasons[0].contains("the validation layer has"), "{record:?}");
+    }
+
+    #[test]
+    fn what_cannot_be_done_is_skipped_unless_the_layer_complains() {
+        let skip = |session: &mut Session<'_>, leaves: bool| {
+            let left = buffer(&session.open()?, "left", BufferUse::Storage)?;
+            if leaves {
+                std::mem::forget(left);
+            }
+            Err(Trouble::Skipped("not here".into()))
+        };
+        let Some(record) = run(|session| skip(session, false)) else { return };
+        assert_eq!((record.outcome, record.reasons), (Outcome::Skipped, vec!["not here".to_owned()]));
+        let record = run(|session| skip(session, true)).expect("a device");
+        assert_eq!(record.outcome, Outcome::Failed, "{record:?}");
+    }
+}
