@@ -111,13 +111,16 @@ unsafe extern "system" fn record(
             kind: format!("{:?}", object.object_type),
             name: text(object.object_name_as_c_str()),
         });
-        let passes = listed(data.p_cmd_buf_labels, data.cmd_buf_label_count).iter();
+        let labels = listed(data.p_cmd_buf_labels, data.cmd_buf_label_count).iter();
+        let mut passes: Vec<_> = labels.filter_map(|label| text(label.label_name_as_c_str())).collect();
+        // Some layers list each twice.
+        passes.dedup();
         let message = Message {
             rule: text(data.message_id_name_as_c_str()).unwrap_or_default(),
             is_error: severity.contains(vk::DebugUtilsMessageSeverityFlagsEXT::ERROR),
             text: text(data.message_as_c_str()).unwrap_or_default(),
             objects: objects.collect(),
-            passes: passes.filter_map(|label| text(label.label_name_as_c_str())).collect(),
+            passes,
         };
         (messages, message)
     };

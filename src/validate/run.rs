@@ -182,11 +182,10 @@ impl Worker {
         let (send, records) = channel();
         thread::spawn(move || {
             // Drivers may print there, too: what is no record is passed over.
-            for line in BufReader::new(output).lines().map_while(std::result::Result::ok) {
-                if let Ok(record) = serde_json::from_str(&line) {
-                    if send.send(record).is_err() {
-                        return;
-                    }
+            let lines = BufReader::new(output).lines().map_while(std::result::Result::ok);
+            for record in lines.filter_map(|line| serde_json::from_str(&line).ok()) {
+                if send.send(record).is_err() {
+                    return;
                 }
             }
         });

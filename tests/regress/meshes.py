@@ -1,4 +1,4 @@
-"""Writes the meshes in meshes/ and the image checker.png: python3 meshes.py, with Python's standard library alone."""
+"""Writes the meshes in meshes/, and those in assets/validation with the image checker.png: python3 meshes.py, with Python's standard library alone."""
 
 import math
 import struct
@@ -6,6 +6,7 @@ import zlib
 from pathlib import Path
 
 FOLDER = Path(__file__).parent
+VALIDATION = FOLDER.parent.parent / "assets" / "validation"
 
 
 def icosphere(level, radius=1.0):
@@ -35,7 +36,7 @@ def icosphere(level, radius=1.0):
     return [tuple(radius * x for x in p) for p in points], points, faces
 
 
-def write(name, what, shells, smooth=True):
+def write(name, what, shells, smooth=True, folder=FOLDER / "meshes"):
     """`shells`: positions, normals, triangles each."""
     lines, first = [f"# {what}"], 1
     for positions, normals, faces in shells:
@@ -45,7 +46,7 @@ def write(name, what, shells, smooth=True):
         corner = (lambda i: f"{i + first}//{i + first}") if smooth else (lambda i: f"{i + first}")
         lines += ["f " + " ".join(corner(i) for i in face) for face in faces]
         first += len(positions)
-    (FOLDER / "meshes" / f"{name}.obj").write_text("\n".join(lines) + "\n")
+    (folder / f"{name}.obj").write_text("\n".join(lines) + "\n")
 
 
 def inwards(shell):
@@ -73,9 +74,10 @@ write("ball", "a ball of radius 1", [icosphere(3)])
 write("hollow", "a hollow ball of radii 1 and 0.9", [icosphere(3), inwards(icosphere(3, 0.9))])
 write("cubes", "two cubes that touch in a face", [box((-1, -0.5, -0.5), (0, 0.5, 0.5)), box((0, -0.5, -0.5), (1, 0.5, 0.5))], smooth=False)
 write("sheet", "a pane of 2 x 2 x 0.0001", [box((-1, -1, -5e-5), (1, 1, 5e-5))], smooth=False)
-(FOLDER / "meshes" / "floor.obj").write_text(
+(VALIDATION / "floor.obj").write_text(
     "# a floor of 8 x 8 with texture coordinates\nv -4 0 -4\nv -4 0 4\nv 4 0 4\nv 4 0 -4\n"
     "vt 0 0\nvt 0 4\nvt 4 4\nvt 4 0\nf 1/1 2/2 3/3 4/4\n")
-(FOLDER / "meshes" / "lamp.obj").write_text(
+(VALIDATION / "lamp.obj").write_text(
     "# a square of 1 x 1 that looks down\nv -0.5 0 -0.5\nv 0.5 0 -0.5\nv 0.5 0 0.5\nv -0.5 0 0.5\nf 1 2 3 4\n")
-(FOLDER / "meshes" / "checker.png").write_bytes(checker(64, 8))
+(VALIDATION / "checker.png").write_bytes(checker(64, 8))
+write("ball", "a ball of radius 1", [icosphere(2)], folder=VALIDATION)
