@@ -11,7 +11,7 @@ use crate::gpu::Instance;
 use crate::image::OutputFile;
 use crate::options::range;
 use crate::report::{validate_html, validate_summary, validate_table};
-use crate::validate::{Check, Record, Report, Run, Tested, work};
+use crate::validate::{Check, Place, Record, Report, Run, Tested, work};
 use crate::{Error, Result, shell};
 
 /// The folder of the report, where the user names none.
@@ -41,6 +41,10 @@ pub(super) struct ValidateCommand {
     #[arg(long)]
     list: bool,
 
+    /// Also what takes many minutes: on processors GPU-assisted validation of every effect in the models that trace
+    #[arg(long)]
+    thorough: bool,
+
     /// How long one check may take, in seconds
     #[arg(long, value_name = "SECONDS", default_value_t = 900.0, value_parser = range::positive)]
     time_limit: f64,
@@ -54,7 +58,8 @@ impl ValidateCommand {
     pub(super) fn run(self, talk: Talk) -> Result<()> {
         let folder = self.output.as_deref().unwrap_or(Path::new(FOLDER));
         if let Some(device) = self.worker {
-            return work(device, folder, std::io::stdin().lock(), std::io::stdout());
+            let place = Place { device, folder, thorough: self.thorough };
+            return work(place, std::io::stdin().lock(), std::io::stdout());
         }
         if self.device.as_deref() == Some("list") {
             return print(&devices::table(&Instance::new(/* validation: */ false)?.devices()?));
@@ -74,6 +79,7 @@ impl ValidateCommand {
             device: self.device.clone(),
             checks: &checks,
             folder,
+            thorough: self.thorough,
             patience: Duration::from_secs_f64(self.time_limit),
         };
         let devices = run.devices()?;
@@ -134,6 +140,7 @@ impl ValidateCommand {
         self.device.iter().for_each(|device| add("--device", device.clone()));
         self.filter.iter().for_each(|part| add("--filter", part.clone()));
         self.output.iter().for_each(|folder| add("--output", folder.display().to_string()));
+        words.extend(self.thorough.then(|| "--thorough".into()));
         shell::line(words.iter().map(String::as_str))
     }
 }

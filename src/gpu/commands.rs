@@ -441,7 +441,10 @@ impl<'r> Recorder<'_, 'r> {
         use vk::{AccessFlags2 as Access, PipelineStageFlags2 as Stage};
         self.memory_barrier(
             BUFFER_WRITES,
-            (Stage::ALL_COMMANDS, Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE | Access::TRANSFER_READ),
+            (
+                Stage::VERTEX_SHADER | Stage::FRAGMENT_SHADER | Stage::COMPUTE_SHADER | Stage::COPY,
+                Access::SHADER_STORAGE_READ | Access::SHADER_STORAGE_WRITE | Access::TRANSFER_READ,
+            ),
         );
     }
 

@@ -61,6 +61,11 @@ impl Use {
         }
     }
 
+    /// Whether it is through a view; Vulkan makes none of images that are only copied.
+    fn has_view(self) -> bool {
+        matches!(self, Self::ColorTarget | Self::DepthTarget | Self::Sampled | Self::Storage)
+    }
+
     fn flag(self) -> vk::ImageUsageFlags {
         use vk::ImageUsageFlags as Flags;
         match self {
@@ -136,6 +141,7 @@ pub struct ImageDesc<'a> {
 /// A two-dimensional image on the device, without mip levels.
 pub struct Image {
     pub(super) handle: vk::Image,
+    /// Null where no use has one.
     pub(super) view: vk::ImageView,
     pub(super) format: Format,
     pub(super) extent: vk::Extent2D,
@@ -194,6 +200,9 @@ impl Image {
         let result = unsafe { gpu.device.bind_image_memory(handle, allocation.memory(), allocation.offset()) };
         image.allocation = Some(allocation);
         bound(desc.name, requirements.size, result)?;
+        if !desc.uses.iter().any(|usage| usage.has_view()) {
+            return Ok(image);
+        }
         let view = vk::ImageViewCreateInfo::default()
             .image(handle)
             .view_type(vk::ImageViewType::TYPE_2D)

@@ -5,7 +5,7 @@ use super::known;
 use super::numbers;
 use super::pictures::{self, Shot};
 use super::record::{Record, Said};
-use super::session::{Session, Trouble, Verdict, hold};
+use super::session::{Place, Session, Trouble, Verdict, hold};
 use crate::effects::Effect;
 use crate::gpu::{Fault, Handicap, Watch};
 use crate::options::{Model, Trace};
@@ -77,6 +77,9 @@ impl Check {
         for model in Model::ALL {
             let name = model.name();
             add(&format!("lost/{name}"), "the device is lost with one submission after the other", Job::Lost(model));
+        }
+        for model in Model::ALL {
+            let name = model.name();
             add(&format!("memory/{name}"), "less and less memory", Job::Memory(model));
         }
         let no_rays = Handicap { no_ray_query: true, ..Handicap::default() };
@@ -106,9 +109,9 @@ impl Check {
         Self::all().into_iter().filter(is_meant).collect()
     }
 
-    /// Tries it on the device of that index; evidence goes to `folder`.
-    pub fn run(&self, device: usize, folder: &std::path::Path) -> Record {
-        Session::run((&self.name, &self.about, self.watch), device, folder, |session| match &self.job {
+    /// Tries it.
+    pub fn run(&self, place: Place<'_>) -> Record {
+        Session::run((&self.name, &self.about, self.watch), place, |session| match &self.job {
             Job::Plant(fault) => plant(session, *fault),
             Job::Render(shot) => pictures::render(session, shot),
             Job::Tracers(model) => pictures::tracers(session, *model),
@@ -139,7 +142,7 @@ fn ways() -> impl Iterator<Item = (Model, Option<Trace>, String)> {
 
 /// The layer notices it, and names it.
 fn plant(session: &mut Session<'_>, fault: Fault) -> Verdict {
-    let messages = fault.plant(session.device())?;
+    let messages = fault.plant(session.place.device)?;
     if let Some(why) = messages.iter().find_map(known::unable) {
         return Err(Trouble::Skipped(why));
     }

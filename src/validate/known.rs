@@ -2,21 +2,31 @@
 
 use crate::gpu::{Message, Watch};
 
-/// What the layer says of itself, or advises against, and why it counts for nothing.
-const ALLOWED: [(&str, &str); 2] = [
-    ("UNASSIGNED-GPU-Assisted Validation Warning", "the layer says what it cannot look at on this device"),
+/// A rule, a part of the text, and why such a message counts for nothing.
+pub const ALLOWED: [(&str, &str, &str); 4] = [
+    ("UNASSIGNED-GPU-Assisted Validation Warning", "", "the layer says what it cannot look at on this device"),
     (
         "UNASSIGNED-BestPractices-vkCreateInstance-specialuse-extension-debugging",
+        "",
         "extensions for debugging are there only where the layer is",
+    ),
+    (
+        "UNASSIGNED-BestPractices-pipeline-stage-flags",
+        "vkCmdWriteTimestamp2",
+        "the time of a pass starts when all commands before it are done, and ends when all of its own are",
+    ),
+    (
+        "UNASSIGNED-BestPractices-ImageBarrierAccessLayout",
+        "VK_ACCESS_2_SHADER_SAMPLED_READ_BIT: accessMask",
+        "the access is a part of VK_ACCESS_2_SHADER_READ_BIT, which the layer wants to see",
     ),
 ];
 
-/// Why a message counts for nothing, if it does.
+/// Why a message counts for nothing, if it does. What core and synchronization checks say always counts.
 pub fn allowed(message: &Message, watch: Watch) -> Option<&'static str> {
-    if watch == Watch::Synchronization {
-        return None;
-    }
-    ALLOWED.iter().find(|(rule, _)| message.rule == *rule).map(|(_, why)| *why)
+    let is_like = |rule: &str, part: &str| message.rule == rule && message.text.contains(part);
+    let found = ALLOWED.iter().find(|(rule, part, _)| is_like(rule, part));
+    found.filter(|_| watch != Watch::Synchronization).map(|(_, _, why)| *why)
 }
 
 /// Why the layer cannot look at what it was asked to look at, if it says so.

@@ -16,3 +16,4 @@ mod session;
 pub use checks::Check;
 pub use record::{Listed, Outcome, Picture, Record, Report, Said, Tested};
 pub use run::{Run, work};
+pub use session::Place;

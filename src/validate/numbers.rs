@@ -12,7 +12,7 @@ pub fn numerics(session: &mut Session<'_>) -> Verdict {
     let gpu = session.open()?;
     let regions = suite::run(&gpu, None, COUNT, 0, &mut |_| {})?;
     let report = NumericsReport::new(gpu.info(), 0, regions);
-    report.write(&NumericsFiles::new(&session.folder().join("numerics"))?)?;
+    report.write(&NumericsFiles::new(&session.place.folder.join("numerics"))?)?;
     session.fact(report.summary());
     report.verdict().map_err(Trouble::Failed)
 }

@@ -1,16 +1,18 @@
 //! Checks that render as users do: every model with every effect on and off, both tracers, layers, checkpoints, pictures that grow.
 
+use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use clap::ValueEnum;
 
 use super::session::{Session, Trouble, Verdict, hold};
-use crate::gpu::{Gpu, GpuError};
+use crate::gpu::{DeviceKind, Gpu, GpuError, Watch};
 use crate::image::FloatImage;
 use crate::options::{Aov, Model, RenderArgs, Size, Tonemap, Trace};
-use crate::passes::{self, Rendered, Renderer, Step};
+use crate::passes::{self, Rendered, Renderer, Step, batches_of};
 use crate::plan::Plan;
+use crate::regress::{Limits, Sampled, chance};
 use crate::report::float_image;
 use crate::scene::Scene;
 use crate::{Error, Result};
@@ -60,15 +62,15 @@ impl Shot {
     }
 }
 
-/// Renders, and holds that every value is a number and not all are black.
+/// Renders, and holds that every value is a number and not all are black. Values may be negative: pure colours of a spectrum are.
 fn picture(gpu: &Gpu, scene: &Scene, args: &RenderArgs) -> Result<(FloatImage, Rendered), Trouble> {
     let plan = Plan::new(scene, args)?;
     passes::check(gpu, &plan)?;
     let rendered = passes::render(gpu, scene, &plan, &mut |_| {})?;
     let image = float_image(&rendered, &plan);
     let values = || image.pixels.iter().flatten();
-    let wrong = values().filter(|value| !value.is_finite() || **value < 0.0).count();
-    hold(wrong == 0, || format!("{wrong} values are negative or not finite"))?;
+    let wrong = values().filter(|value| !value.is_finite()).count();
+    hold(wrong == 0, || format!("{wrong} values are not finite"))?;
     hold(values().any(|&value| value > 0.0), || "the picture is black".into())?;
     Ok((image, rendered))
 }
@@ -77,6 +79,11 @@ fn picture(gpu: &Gpu, scene: &Scene, args: &RenderArgs) -> Result<(FloatImage, R
 pub fn render(session: &mut Session<'_>, shot: &Shot) -> Verdict {
     let gpu = session.open()?;
     shot.is_for(&gpu)?;
+    let is_long = session.watch() == Watch::GpuAssisted && !shot.plain && shot.model.traces();
+    if is_long && gpu.info().kind == DeviceKind::Cpu && !session.place.thorough {
+        let why = "on a processor what the layer adds takes minutes to compile; --thorough tries it all the same";
+        return Err(Trouble::Skipped(why.into()));
+    }
     let (image, rendered) = picture(&gpu, &shot.scene()?, &shot.args()?)?;
     session.keep("", &image)?;
     if let Some(ms) = rendered.gpu_ms() {
@@ -85,25 +92,55 @@ pub fn render(session: &mut Session<'_>, shot: &Shot) -> Verdict {
     Ok(())
 }
 
-/// Rays that the hardware traces and those that the shader does see the same.
+/// Rays that the hardware traces and those that the shader does see the same: in `tree` pixel by pixel, in `path`, whose ways part
+/// with the last bit of a distance, as far as chance goes.
 pub fn tracers(session: &mut Session<'_>, model: Model) -> Verdict {
-    /// A ray that runs along an edge may miss on one side what it meets on the other.
-    const MOST_DIFFERENT: f64 = 0.02;
     let gpu = session.open()?;
-    let mut images = Vec::new();
-    for trace in [Trace::Software, Trace::Hardware] {
+    let mut found = Vec::new();
+    for (number, trace) in (0..).zip([Trace::Software, Trace::Hardware]) {
         let shot = Shot::rich(model, Some(trace));
         shot.is_for(&gpu)?;
-        let (image, _) = picture(&gpu, &shot.scene()?, &shot.args()?)?;
+        // What is compared by chance has to be of different chances.
+        let args = match model {
+            Model::Path => RenderArgs { seed: Some(number), samples: Some(64), ..shot.args()? },
+            _ => shot.args()?,
+        };
+        let scene = shot.scene()?;
+        let (image, rendered) = picture(&gpu, &scene, &args)?;
         session.keep(&format!("-{}", trace.name()), &image)?;
-        images.push(image);
+        found.push((rendered, Plan::new(&scene, &args)?));
     }
+    let [software, hardware] = &found[..] else { return Ok(()) };
+    if model == Model::Path {
+        differ_by_chance(session, software, hardware)
+    } else {
+        are_alike(session, software, hardware)
+    }
+}
+
+fn are_alike(session: &mut Session<'_>, (a, _): &(Rendered, Plan), (b, _): &(Rendered, Plan)) -> Verdict {
+    /// A ray that runs along an edge may miss on one side what it meets on the other.
+    const MOST_DIFFERENT: f64 = 0.02;
     let differ =
         |(a, b): &(&[f32; 3], &[f32; 3])| a.iter().zip(*b).any(|(a, b)| (a - b).abs() > 1e-2 * (a.abs() + 0.1));
-    let different = images[0].pixels.iter().zip(&images[1].pixels).filter(differ).count();
-    let share = different as f64 / images[0].pixels.len() as f64;
-    session.fact(format!("{:.2} % of the pixels differ by more than 1 %", 100.0 * share));
-    hold(share <= MOST_DIFFERENT, || format!("{:.1} % of the pixels differ by more than 1 %", 100.0 * share))
+    let different = a.radiance.iter().zip(&b.radiance).filter(differ).count();
+    let share = different as f64 / a.radiance.len() as f64;
+    let told = format!("{:.2} % of the pixels differ by more than 1 %", 100.0 * share);
+    session.fact(told.clone());
+    hold(share <= MOST_DIFFERENT, || told)
+}
+
+fn differ_by_chance(session: &mut Session<'_>, a: &(Rendered, Plan), b: &(Rendered, Plan)) -> Verdict {
+    let sampled = |(rendered, plan): &'_ (Rendered, Plan)| {
+        let stderr = rendered.counts.as_ref().and_then(|counts| counts.stderr.clone()).unwrap_or_default();
+        (rendered.radiance.clone(), stderr, batches_of(plan, rendered.samples))
+    };
+    let (a, b) = (sampled(a), sampled(b));
+    let [a, b] = [&a, &b].map(|(mean, stderr, batches)| Sampled { mean, stderr, batches: *batches });
+    let measures = chance(a, b);
+    session.fact(measures.map(|(measure, value)| format!("{} {value:.2e}", measure.name())).join(", "));
+    let broken = Limits::default_of(/* is_random: */ true).broken(&measures);
+    hold(broken.is_empty(), || broken.join(", "))
 }
 
 /// Every layer that the model has.
@@ -145,15 +182,19 @@ pub fn checkpoint(session: &mut Session<'_>) -> Verdict {
     let gpu = session.open()?;
     let shot = Shot::rich(Model::Path, Some(Trace::Software));
     let scene = shot.scene()?;
-    let whole = RenderArgs { samples: Some(32), ..shot.args()? };
-    let path = session.folder().join("checkpoint.part");
-    let first = RenderArgs { samples: Some(16), checkpoint: Some(path.clone()), ..shot.args()? };
-    picture(&gpu, &scene, &first)?;
-    let (resumed, rendered) = picture(&gpu, &scene, &RenderArgs { checkpoint: Some(path.clone()), ..whole.clone() })?;
+    let path = session.place.folder.join("checkpoint.part");
+    let within = |seconds, checkpoint: Option<&Path>| -> Result<_> {
+        let checkpoint = checkpoint.map(Path::to_path_buf);
+        Ok(RenderArgs { samples: Some(64), time_budget: Some(seconds), checkpoint, ..shot.args()? })
+    };
+    // The first ends after a round, for want of time.
+    picture(&gpu, &scene, &within(1e-6, Some(&path))?)?;
+    let (resumed, rendered) = picture(&gpu, &scene, &within(1e6, Some(&path))?)?;
     std::fs::remove_file(&path).map_err(|source| Error::file(&path, "remove", source))?;
-    let (at_once, _) = picture(&gpu, &scene, &whole)?;
+    let (at_once, _) = picture(&gpu, &scene, &within(1e6, None)?)?;
     session.fact(format!("went on from {} of {} samples", rendered.resumed, rendered.samples));
-    hold(rendered.resumed > 0, || "it did not go on from the checkpoint".into())?;
+    let is_between = (1..rendered.samples).contains(&rendered.resumed);
+    hold(is_between, || format!("it went on from {} of {} samples", rendered.resumed, rendered.samples))?;
     hold(resumed.pixels == at_once.pixels, || "it is another picture than the one made at once".into())
 }
 
@@ -185,6 +226,7 @@ pub fn refine(session: &mut Session<'_>) -> Verdict {
         }
         let shown = renderer.display(&mut picture)?;
         let radiance = renderer.radiance(&picture)?;
+        renderer.image_of(picture.size(), &vec![[255; 4]; radiance.len()])?;
         renderer.counts(&picture)?;
         hold(radiance.iter().flatten().all(|value| value.is_finite()), || "a value is not finite".into())?;
         hold((shown.width(), shown.height()) == (width, height), || "what is shown is of another size".into())?;

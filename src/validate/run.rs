@@ -10,6 +10,7 @@ use std::time::{Duration, Instant};
 
 use super::checks::Check;
 use super::record::{Listed, Outcome, Record, Report, Tested};
+use super::session::Place;
 use crate::gpu::{GpuError, Instance, find_device};
 use crate::image::make_folder;
 use crate::{Error, Result};
@@ -32,6 +33,8 @@ pub struct Run<'a> {
     pub checks: &'a [Check],
     /// Where evidence goes.
     pub folder: &'a Path,
+    /// What takes minutes is done, too.
+    pub thorough: bool,
     /// How long a check may take.
     pub patience: Duration,
 }
@@ -172,6 +175,7 @@ impl Worker {
     fn start(run: &Run<'_>, tested: &Tested, folder: &Path) -> Result<Self> {
         let mut command = run.command(tested.manifest.as_deref().map(Path::new))?;
         command.arg("validate").arg("--output").arg(folder).arg("--worker").arg(tested.device.index.to_string());
+        command.args(run.thorough.then_some("--thorough"));
         let piped = command.stdin(Stdio::piped()).stdout(Stdio::piped()).stderr(Stdio::piped());
         let mut child = piped.spawn().map_err(|source| run.not_started(source))?;
         let (Some(input), Some(output), Some(mut errors)) =
@@ -242,15 +246,15 @@ impl Worker {
     }
 }
 
-/// The other side: does each check that `input` names on the device of that index, and tells `output` what came of it.
-pub fn work(device: usize, folder: &Path, input: impl BufRead, mut output: impl Write) -> Result<()> {
+/// The other side: does each check that `input` names, and tells `output` what came of it.
+pub fn work(place: Place<'_>, input: impl BufRead, mut output: impl Write) -> Result<()> {
     let checks = Check::all();
     for name in input.lines() {
         let name = name.map_err(|source| Error::file("standard input", "read", source))?;
         let Some(check) = checks.iter().find(|check| check.name == name) else {
             return Err(Error::Usage(format!("there is no check {name:?}")));
         };
-        let record = check.run(device, folder);
+        let record = check.run(place);
         let line = serde_json::to_string(&record).unwrap_or_default();
         writeln!(output, "{line}")
             .and_then(|()| output.flush())

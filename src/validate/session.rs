@@ -36,10 +36,21 @@ pub fn hold(holds: bool, otherwise: impl FnOnce() -> String) -> Verdict {
     if holds { Ok(()) } else { Err(Trouble::Failed(otherwise())) }
 }
 
+/// Where and how checks are done.
+#[derive(Clone, Copy, Debug)]
+pub struct Place<'a> {
+    /// The index of the device.
+    pub device: usize,
+    /// Where pictures go, and what else is written.
+    pub folder: &'a Path,
+    /// What takes minutes is done, too.
+    pub thorough: bool,
+}
+
 /// One check on its way.
 pub struct Session<'a> {
-    device: usize,
-    folder: &'a Path,
+    /// Where it is done.
+    pub place: Place<'a>,
     watch: Watch,
     opened: Vec<Arc<Messages>>,
     witnesses: Vec<Witness>,
@@ -47,11 +58,10 @@ pub struct Session<'a> {
 }
 
 impl<'a> Session<'a> {
-    /// Runs `body` and tells what came of it. Pictures and what else is written go to `folder`.
+    /// Runs `body` and tells what came of it.
     pub fn run(
         (name, about, watch): (&str, &str, Watch),
-        device: usize,
-        folder: &'a Path,
+        place: Place<'a>,
         body: impl FnOnce(&mut Self) -> Verdict,
     ) -> Record {
         let start = Instant::now();
@@ -65,7 +75,7 @@ impl<'a> Session<'a> {
             pictures: Vec::new(),
             seconds: 0.0,
         };
-        let mut session = Self { device, folder, watch, opened: Vec::new(), witnesses: Vec::new(), record };
+        let mut session = Self { place, watch, opened: Vec::new(), witnesses: Vec::new(), record };
         let verdict = body(&mut session);
         let Self { opened, witnesses, mut record, .. } = session;
         match verdict {
@@ -118,25 +128,15 @@ impl<'a> Session<'a> {
     /// The same of an instance made for something special.
     pub fn open_in(&mut self, instance: &Arc<Instance>, handicap: Handicap) -> Result<Gpu> {
         self.opened.push(instance.messages());
-        let info = instance.devices()?.into_iter().nth(self.device).ok_or(GpuError::NoDevice)?;
+        let info = instance.devices()?.into_iter().nth(self.place.device).ok_or(GpuError::NoDevice)?;
         let gpu = Gpu::open(instance, info.with_handicap(handicap))?;
         self.witnesses.push(gpu.witness());
         Ok(gpu)
     }
 
-    /// The index of the device.
-    pub fn device(&self) -> usize {
-        self.device
-    }
-
     /// What is looked at.
     pub fn watch(&self) -> Watch {
         self.watch
-    }
-
-    /// Where a check may write.
-    pub fn folder(&self) -> &Path {
-        self.folder
     }
 
     /// Something worth knowing.
@@ -152,7 +152,7 @@ impl<'a> Session<'a> {
     /// Keeps a picture as evidence.
     pub fn keep(&mut self, name: &str, image: &FloatImage) -> Result<()> {
         let file = format!("{}{name}.png", self.record.name.replace('/', "-"));
-        let path = self.folder.join(&file);
+        let path = self.place.folder.join(&file);
         let bytes = shown(image, image).map_err(|source| Error::file(&path, "write", source))?;
         OutputFile::new(&path)?.write(&bytes)?;
         let hash = format!("{:032x}", xxh3_128(bytemuck::cast_slice(&image.pixels)));
@@ -172,7 +172,10 @@ mod tests {
         let has = Instance::watched(Watch::Synchronization).and_then(|instance| instance.choose(Some("0"))).is_ok();
         assert!(has || std::env::var_os("VITRUM_REQUIRE_DEVICE").is_none(), "no device");
         let folder = tempfile::tempdir().expect("a folder");
-        has.then(|| Session::run(("a check", "", Watch::Synchronization), 0, folder.path(), body))
+        has.then(|| {
+            let place = Place { device: 0, folder: folder.path(), thorough: false };
+            Session::run(("a check", "", Watch::Synchronization), place, body)
+        })
     }
 
     fn buffer(gpu: &Gpu, name: &str, usage: BufferUse) -> Result<Buffer> {
