@@ -164,6 +164,16 @@ impl Gpu {
     }
 }
 
+#[cfg(test)]
+impl Gpu {
+    /// Takes the device from under all that is left on it, to see what the layer calls that. Nothing of it may be touched again.
+    pub(crate) fn abandon(self) {
+        // SAFETY: nothing is being executed; the caller forgets what is left.
+        unsafe { self.device.destroy_device(None) };
+        std::mem::forget(self);
+    }
+}
+
 impl Open {
     /// Bytes of the largest heap.
     pub(super) fn heap(&self) -> u64 {

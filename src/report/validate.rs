@@ -59,10 +59,14 @@ pub(super) fn groups(checks: &[Record]) -> impl Iterator<Item = Group<'_>> {
 }
 
 /// Each reason once.
-pub(super) fn why_skipped(checks: &[Record]) -> Vec<&str> {
+fn why_skipped(checks: &[Record]) -> Vec<&str> {
     let skipped = checks.iter().filter(|check| check.outcome == Outcome::Skipped);
-    let mut all: Vec<_> = skipped.flat_map(|check| &check.reasons).map(String::as_str).collect();
-    all.dedup();
+    let mut all: Vec<&str> = Vec::new();
+    for reason in skipped.flat_map(|check| &check.reasons) {
+        if !all.contains(&reason.as_str()) {
+            all.push(reason);
+        }
+    }
     all
 }
 

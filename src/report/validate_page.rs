@@ -14,7 +14,10 @@ h3 { margin: 1.2em 0 .2em }
 table { border-collapse: collapse; width: 100% }
 td { text-align: left; padding: .15em 1em .15em 0; border-bottom: 1px solid #e5e5e5; vertical-align: top }
 td.n { text-align: right; white-space: nowrap; font-variant-numeric: tabular-nums }
-td:first-child { white-space: nowrap }
+td:first-child { white-space: nowrap; width: 19em }
+td:nth-child(2) { width: 5em }
+td:nth-child(3) { width: 4.5em }
+td:nth-child(5) { width: 30% }
 tr.bad td { background: #fdd; color: #900 }
 tr.skipped td { color: #777 }
 td img { image-rendering: pixelated; background: #000; width: 96px; margin-right: .4em; vertical-align: top }
@@ -35,6 +38,23 @@ pub fn html(report: &Report) -> String {
         escaped(&report.system),
         escaped(&report.command)
     );
+    let bad: Vec<_> = report.checks().filter(|(_, check)| !check.outcome.is_good()).collect();
+    if !bad.is_empty() {
+        text += "<p>To be looked at:</p>\n<ul>\n";
+        for (tested, check) in bad {
+            // Writing to a string cannot fail.
+            let _ = writeln!(
+                text,
+                "<li><a href=\"#{}\">{}: {}</a>, {}: {}</li>",
+                anchor(&tested.folder, check),
+                escaped(&tested.device.name),
+                escaped(&check.name),
+                check.outcome.name().to_lowercase(),
+                escaped(check.reasons.first().map_or("", String::as_str))
+            );
+        }
+        text += "</ul>\n";
+    }
     for tested in &report.devices {
         device(&mut text, tested);
     }
@@ -70,6 +90,11 @@ fn device(text: &mut String, tested: &Tested) {
     }
 }
 
+/// Where a check stands on the page.
+fn anchor(folder: &str, check: &Record) -> String {
+    format!("{folder}-{}", check.name.replace('/', "-"))
+}
+
 fn row(text: &mut String, check: &Record, folder: &str) {
     let class = match check.outcome {
         Outcome::Passed => "",
@@ -98,8 +123,8 @@ fn row(text: &mut String, check: &Record, folder: &str) {
     }
     let _ = writeln!(
         text,
-        "<tr class=\"{class}\" id=\"{folder}-{}\"><td>{}</td><td>{}</td><td class=\"n\">{:.2} s</td><td>{details}</td><td>{pictures}</td></tr>",
-        check.name.replace('/', "-"),
+        "<tr class=\"{class}\" id=\"{}\"><td>{}</td><td>{}</td><td class=\"n\">{:.2} s</td><td>{details}</td><td>{pictures}</td></tr>",
+        anchor(folder, check),
         escaped(&check.name),
         check.outcome.name(),
         check.seconds

@@ -150,7 +150,7 @@ fn plant(session: &mut Session<'_>, fault: Fault) -> Verdict {
     session.expected(messages.into_iter().map(|message| Said {
         message,
         times: 1,
-        allowed: Some("wanted: the fault was planted".into()),
+        allowed: Some("the fault was planted".into()),
     }));
     hold(is_seen, || "the validation layer does not notice it: what it does not complain of is no proof".into())
 }

@@ -96,10 +96,10 @@ pub fn render(session: &mut Session<'_>, shot: &Shot) -> Verdict {
 /// with the last bit of a distance, as far as chance goes.
 pub fn tracers(session: &mut Session<'_>, model: Model) -> Verdict {
     let gpu = session.open()?;
+    Shot::rich(model, Some(Trace::Hardware)).is_for(&gpu)?;
     let mut found = Vec::new();
     for (number, trace) in (0..).zip([Trace::Software, Trace::Hardware]) {
         let shot = Shot::rich(model, Some(trace));
-        shot.is_for(&gpu)?;
         // What is compared by chance has to be of different chances.
         let args = match model {
             Model::Path => RenderArgs { seed: Some(number), samples: Some(64), ..shot.args()? },

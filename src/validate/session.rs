@@ -164,8 +164,14 @@ impl<'a> Session<'a> {
 
 #[cfg(test)]
 mod tests {
+    use std::collections::BTreeSet;
+
     use super::*;
     use crate::gpu::{Buffer, BufferDesc, BufferUse, Commands};
+    use crate::options::{Model, RenderArgs, Size, Trace};
+    use crate::passes::Renderer;
+    use crate::plan::Plan;
+    use crate::scene::Scene;
 
     /// What comes of `body` on the first device; `None` where there is none.
     fn run(body: impl FnOnce(&mut Session<'_>) -> Verdict) -> Option<Record> {
@@ -238,5 +244,43 @@ mod tests {
         assert_eq!((record.outcome, record.reasons), (Outcome::Skipped, vec!["not here".to_owned()]));
         let record = run(|session| skip(session, true)).expect("a device");
         assert_eq!(record.outcome, Outcome::Failed, "{record:?}");
+    }
+
+    /// The layer tells what is left when a device goes: everything, where it is taken from under a renderer.
+    #[test]
+    fn everything_on_a_device_has_a_name() {
+        let Ok(instance) = Instance::watched(Watch::Synchronization) else { return };
+        let Ok(device) = instance.choose(Some("0")) else { return };
+        let gpu = Gpu::open(&instance, device).expect("a device");
+        let scene = Scene::of_every_effect().expect("a scene");
+        let mut kinds = BTreeSet::new();
+        for model in Model::ALL {
+            let args = RenderArgs {
+                model: Some(model.into()),
+                size: Some(Size { width: 16, height: 12 }),
+                samples: Some(2),
+                trace: (model.traces() && gpu.ray_query()).then_some(Trace::Hardware),
+                ..RenderArgs::default()
+            };
+            let plan = Plan::new(&scene, &args).expect("a plan");
+            let renderer = Renderer::new(&gpu, &scene, &plan).expect("a renderer");
+            std::mem::forget((renderer.begin(&plan).expect("a picture"), renderer));
+        }
+        gpu.abandon();
+        let said = instance.messages().all();
+        std::mem::forget(instance);
+        for message in &said {
+            assert!(message.rule.contains("vkDestroyDevice"), "{message}");
+            for object in &message.objects {
+                assert!(object.name.is_some(), "{object:?} of {message}");
+                kinds.insert(object.kind.clone());
+            }
+        }
+        println!("{} objects of {kinds:?}", said.len());
+        for kind in
+            ["BUFFER", "IMAGE", "IMAGE_VIEW", "PIPELINE", "PIPELINE_LAYOUT", "DESCRIPTOR_SET_LAYOUT", "DEVICE_MEMORY"]
+        {
+            assert!(kinds.contains(kind), "no {kind} among {kinds:?}");
+        }
     }
 }
