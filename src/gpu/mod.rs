@@ -20,6 +20,7 @@ mod pipeline;
 mod screen;
 mod shader;
 mod shared;
+mod transfer;
 
 pub use acceleration::{AccelerationStructure, MeshStructures, PlacedMesh};
 pub use bind_group::{Bind, BindGroup};

@@ -80,6 +80,22 @@ pub struct Record {
     pub seconds: f64,
 }
 
+impl Record {
+    /// Of a check that is about to be done.
+    pub fn new(name: &str, about: &str) -> Self {
+        Self {
+            name: name.into(),
+            about: about.into(),
+            outcome: Outcome::Passed,
+            reasons: Vec::new(),
+            facts: Vec::new(),
+            said: Vec::new(),
+            pictures: Vec::new(),
+            seconds: 0.0,
+        }
+    }
+}
+
 /// A device and its checks.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "docs/validate.md describes the members")]

@@ -225,17 +225,8 @@ impl Worker {
             _ => format!("the process ended: {}", status.map_or_else(|error| error.to_string(), |s| s.to_string())),
         }];
         reasons.extend((!said.is_empty()).then(|| format!("its last words: {said}")));
-        let record = Record {
-            name: check.name.clone(),
-            about: check.about.clone(),
-            outcome,
-            reasons,
-            facts: Vec::new(),
-            said: Vec::new(),
-            pictures: Vec::new(),
-            seconds: start.elapsed().as_secs_f64(),
-        };
-        (record, None)
+        let seconds = start.elapsed().as_secs_f64();
+        (Record { outcome, reasons, seconds, ..Record::new(&check.name, &check.about) }, None)
     }
 
     fn end(mut self) {

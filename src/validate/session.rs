@@ -65,16 +65,7 @@ impl<'a> Session<'a> {
         body: impl FnOnce(&mut Self) -> Verdict,
     ) -> Record {
         let start = Instant::now();
-        let record = Record {
-            name: name.into(),
-            about: about.into(),
-            outcome: Outcome::Passed,
-            reasons: Vec::new(),
-            facts: Vec::new(),
-            said: Vec::new(),
-            pictures: Vec::new(),
-            seconds: 0.0,
-        };
+        let record = Record::new(name, about);
         let mut session = Self { place, watch, opened: Vec::new(), witnesses: Vec::new(), record };
         let verdict = body(&mut session);
         let Self { opened, witnesses, mut record, .. } = session;
