@@ -89,8 +89,12 @@ impl RegressCommand {
         let start = Instant::now();
         let path = self.suite.clone().map_or_else(default_suite, Ok)?;
         let suite = Suite::load(&path)?;
-        let mut filter = self.filter.clone();
-        filter.extend(self.bless.iter().flatten().filter(|part| !part.is_empty()).cloned());
+        let blessed = self.bless.iter().flatten().filter(|part| !part.is_empty());
+        let filter: Vec<_> = self.filter.iter().chain(blessed).cloned().collect();
+        if !self.filter.is_empty() && filter.len() > self.filter.len() {
+            let message = "--bless names pictures and --filter others; name all that are meant in one of them";
+            return Err(Error::Usage(message.into()));
+        }
         let wishes = Wishes {
             blesses: self.bless.is_some(),
             filter,

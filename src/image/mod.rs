@@ -9,7 +9,7 @@ mod read;
 
 pub use self::exr::{decode_whole as decode_whole_exr, encode as encode_exr};
 pub(crate) use levels::halved;
-pub use output::{ImageFormat, OutputFile, check_folder, make_folder};
+pub use output::{FolderLock, ImageFormat, LOCK, OutputFile, check_folder, make_folder};
 pub use png::encode as encode_png;
 pub use read::{KNOWN_FORMATS, LARGEST_SIDE, Stored, Unreadable, decode, decode_stored};
 

@@ -1,6 +1,6 @@
 //! Files that are written whole or not at all. In flow a path, before the work starts, and bytes, when it is done.
 
-use std::fs::{self, File};
+use std::fs::{self, File, TryLockError};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -234,6 +234,37 @@ pub fn check_folder(folder: &Path, otherwise: &'static str) -> Result<()> {
 pub fn make_folder(folder: &Path, otherwise: &'static str) -> Result<()> {
     check_folder(folder, otherwise)?;
     std::fs::create_dir_all(folder).map_err(|source| Error::file(folder, "create", source))
+}
+
+/// The file in a folder by which one run at a time has it.
+pub const LOCK: &str = "lock";
+
+/// A folder that no other run writes to while this is there.
+#[derive(Debug)]
+pub struct FolderLock {
+    _file: File,
+}
+
+impl FolderLock {
+    /// Takes the folder, which is there.
+    pub fn take(folder: &Path) -> Result<Self> {
+        let path = folder.join(LOCK);
+        let mut options = File::options();
+        let file = options
+            .create(true)
+            .truncate(false)
+            .write(true)
+            .open(&path)
+            .map_err(|source| Error::file(&path, "create", source))?;
+        match file.try_lock() {
+            Err(TryLockError::WouldBlock) => {
+                let why = "another run writes its report there; wait for it, or name another folder";
+                Err(Error::input(folder, 0, why))
+            }
+            // Some file systems have no locks; there, two runs are the user's to keep apart.
+            Ok(()) | Err(TryLockError::Error(_)) => Ok(Self { _file: file }),
+        }
+    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::image::{OutputFile, make_folder};
+use crate::image::{FolderLock, OutputFile, make_folder};
 use crate::{Error, Result};
 
 /// Folders in that of the report.
@@ -194,12 +194,15 @@ pub struct Folder {
     path: PathBuf,
     /// Whether there is something to go on from.
     pub resumes: bool,
+    /// Held so that no other run writes there.
+    _lock: FolderLock,
 }
 
 impl Folder {
     /// Opens or makes it. One that holds something else is refused.
     pub fn open(path: &Path) -> Result<Self> {
         make_folder(path, NO_FOLDER)?;
+        let lock = FolderLock::take(path)?;
         let resumes = path.join(UNFINISHED).exists();
         let known = path.join(Report::FILE).exists() || resumes;
         if !known && path.join("index.html").exists() {
@@ -213,7 +216,7 @@ impl Folder {
             }
             make_folder(&folder, NO_FOLDER)?;
         }
-        let folder = Self { path: path.into(), resumes };
+        let folder = Self { path: path.into(), resumes, _lock: lock };
         folder.write(UNFINISHED, b"")?;
         Ok(folder)
     }
@@ -288,6 +291,11 @@ pub fn merged(folders: &[PathBuf], output: &Path) -> Result<(Folder, Report)> {
             "merge: the parts {} are missing; name their folders, too",
             missing.join(", ")
         )));
+    }
+    let is_part = |folder: &&PathBuf| folder.canonicalize().ok() == output.canonicalize().ok();
+    if let Some(part) = folders.iter().filter(|_| output.exists()).find(is_part) {
+        let why = "is one of the parts and would be replaced; name another folder for the report of all";
+        return Err(Error::input(part, 0, why));
     }
     let output = Folder::open(output)?;
     let mut pictures: Vec<Record> = Vec::new();

@@ -79,9 +79,11 @@ impl Run<'_> {
         let parts = &wishes.filter;
         let is_meant = |picture: &Picture| parts.is_empty() || parts.iter().any(|part| picture.name.contains(part));
         let meant: Vec<usize> = (0..suite.pictures.len()).filter(|&number| is_meant(&suite.pictures[number])).collect();
-        if meant.is_empty() {
-            let (path, parts) = (suite.path.display(), parts.join(", "));
-            return Err(Error::Check(format!("{path}: no picture has {parts} in its name")));
+        // A part that none has is a slip, whatever the others find.
+        let is_found = |part: &&String| meant.iter().any(|&number| suite.pictures[number].name.contains(part.as_str()));
+        if let Some(part) = parts.iter().find(|part| !is_found(part)) {
+            let path = suite.path.display();
+            return Err(Error::Check(format!("{path}: no picture has {part} in its name")));
         }
         Ok(meant.into_iter().filter(|&number| wishes.shard.is_none_or(|shard| shard.has(number))).collect())
     }
@@ -269,8 +271,8 @@ impl Run<'_> {
                 Some(format!("there is no reference {}; make it with --bless", path.display()))
             }
             (Ok(Some(reference)), _) if reference.options != ready.options => {
-                let (was, is) = (&reference.options, &ready.options);
-                Some(format!("the reference was made with {was}, not {is}; make it again with --bless"))
+                let (was, is) = differing(&reference.options, &ready.options);
+                Some(format!("the reference was made with {was}, this with {is}; make it again with --bless"))
             }
             (Ok(Some(_)), None) => Some("the reference is of another size; make it again with --bless".into()),
             (Ok(Some(_)), Some(_)) => None,
@@ -350,6 +352,23 @@ impl Run<'_> {
             _ => {}
         }
     }
+}
+
+/// The options that only one of two lists has, of each.
+fn differing(a: &str, b: &str) -> (String, String) {
+    let split = |text: &str| -> Vec<String> {
+        text.split("--")
+            .map(str::trim)
+            .filter(|option| !option.is_empty())
+            .map(|option| format!("--{option}"))
+            .collect()
+    };
+    let (a, b) = (split(a), split(b));
+    let only = |of: &[String], other: &[String]| {
+        let only: Vec<_> = of.iter().filter(|option| !other.contains(option)).map(String::as_str).collect();
+        if only.is_empty() { "fewer options".to_owned() } else { only.join(" ") }
+    };
+    (only(&a, &b), only(&b, &a))
 }
 
 impl Made {

@@ -53,6 +53,9 @@ pub fn summary(report: &Report) -> String {
     let counts = all.into_iter().map(|outcome| (report.count(outcome), outcome.name().to_lowercase()));
     let counts: Vec<_> =
         counts.filter(|(count, _)| *count > 0).map(|(count, name)| format!("{count} {name}")).collect();
+    if report.pictures.is_empty() {
+        return "no pictures in this part of the suite: nothing was compared".into();
+    }
     let number = report.pictures.len();
     let pictures = if number == 1 { "picture" } else { "pictures" };
     format!("{number} {pictures} in {:.1} s: {}", report.seconds, counts.join(", "))
