@@ -74,7 +74,7 @@ pub enum GpuError {
 
     /// The validation layer was asked for and is not installed.
     #[error(
-        "--validation needs VK_LAYER_KHRONOS_validation; install it (Debian, Ubuntu: vulkan-validationlayers) or run ci/setup.sh"
+        "there is no VK_LAYER_KHRONOS_validation here; install it (Debian, Ubuntu: vulkan-validationlayers) or run ci/setup.sh"
     )]
     NoValidationLayer,
 

@@ -1,8 +1,9 @@
 //! Faults, planted to see whether the validation layer notices and names what is broken. In flow a device, out flow its messages.
 //!
 //! Each is what a change of this room could bring about by mistake, and nothing outside of the room could. Calls that the layer
-//! complains of do not reach the driver; what it complains of too late, or not at all, is harmless on drivers as they are: a copy that
-//! reads old bytes, a layout that is not the one named, a buffer more when all ends, a write within the block that a buffer lies in.
+//! complains of do not reach the driver. What it complains of too late is harmless on drivers as they are: a copy that reads old bytes,
+//! a layout that is not the one named, a buffer more when all ends, a write within the block that a buffer lies in. Where it does not
+//! notice that a buffer is gone, the driver may crash: plant in a process that may.
 
 use std::sync::Arc;
 
@@ -56,6 +57,29 @@ impl Fault {
         }
     }
 
+    /// What for.
+    pub fn about(self) -> &'static str {
+        match self {
+            Self::MissingBarrier => "a copy reads what the copy before it may still be writing: noticed, and named",
+            Self::WrongLayout => "an image is not in the layout that a barrier says it is in: noticed, and named",
+            Self::LeakedBuffer => "a buffer is left when the device goes: noticed, and named",
+            Self::UseAfterFree => "a shader is run on a buffer that is gone: noticed, and named",
+            Self::OutOfBoundsIndex => "a shader writes beyond the end of a buffer: noticed, and named",
+        }
+    }
+
+    /// Whether `message` is about it: an error that names what is broken, and says how.
+    pub fn is_noticed_in(self, message: &Message) -> bool {
+        let how = match self {
+            Self::MissingBarrier => "SYNC-HAZARD",
+            Self::WrongLayout => "layout",
+            Self::LeakedBuffer => "vkDestroyDevice",
+            Self::UseAfterFree => "destroyed",
+            Self::OutOfBoundsIndex => "out of bounds",
+        };
+        message.is_error && message.names(self.planted()) && (message.rule.contains(how) || message.text.contains(how))
+    }
+
     /// What notices it.
     pub fn watch(self) -> Watch {
         match self {
@@ -64,21 +88,22 @@ impl Fault {
         }
     }
 
-    /// Plants it on the device of that index. What the layer said of it, to the end of the instance.
-    pub fn plant(self, device: usize) -> Result<Vec<Message>> {
+    /// Plants it on the device of that index. What the layer said of it, to the end of the instance, and how it ended.
+    pub fn plant(self, device: usize) -> Result<(Vec<Message>, Result<()>)> {
         let instance = Instance::watched(self.watch())?;
         let messages = instance.messages();
         messages.stop_calls();
+        messages.echo();
         let devices = instance.devices()?;
         let info: DeviceInfo = devices.into_iter().nth(device).ok_or(GpuError::NoDevice)?;
         let gpu = Gpu::open(&instance, info)?;
-        match self.plant_on(&gpu) {
+        let ended = match self.plant_on(&gpu) {
             // The layer's way of ending a call.
-            Ok(()) | Err(GpuError::Call { result: vk::Result::ERROR_VALIDATION_FAILED_EXT, .. }) => {}
-            Err(error) => return Err(error),
-        }
+            Err(GpuError::Call { result: vk::Result::ERROR_VALIDATION_FAILED_EXT, .. }) => Ok(()),
+            ended => ended,
+        };
         drop((gpu, instance));
-        Ok(messages.all())
+        Ok((messages.all(), ended))
     }
 
     fn plant_on(self, gpu: &Gpu) -> Result<()> {

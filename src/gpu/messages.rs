@@ -2,6 +2,7 @@
 
 use std::ffi::{CStr, c_void};
 use std::fmt;
+use std::io::Write;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -35,7 +36,10 @@ pub struct Message {
 impl Message {
     /// Whether it says the same of the same things, wherever those lie.
     pub fn is_like(&self, other: &Self) -> bool {
-        self.rule == other.rule && self.objects == other.objects && self.passes == other.passes
+        let all = |message: &Self| {
+            (message.rule.clone(), message.is_error, message.objects.clone(), without_handles(&message.text))
+        };
+        all(self) == all(other) && self.passes == other.passes
     }
 
     /// Whether something of that name is meant.
@@ -50,6 +54,13 @@ impl fmt::Display for Message {
     }
 }
 
+/// A text without the numbers in it that start with 0x.
+fn without_handles(text: &str) -> String {
+    let mut parts = text.split("0x");
+    let first = parts.next().unwrap_or_default().to_owned();
+    parts.fold(first, |all, part| all + "0x" + part.trim_start_matches(|c: char| c.is_ascii_hexdigit()))
+}
+
 /// That there are some, and the first of them, in a line.
 pub fn complaint(messages: &[Message]) -> Option<String> {
     let first = messages.first()?.text.lines().next().unwrap_or_default();
@@ -62,6 +73,8 @@ pub struct Messages {
     all: Mutex<Vec<Message>>,
     /// Calls that an error is said of do not reach the driver.
     stops_calls: AtomicBool,
+    /// They go to standard error, too.
+    is_echoed: AtomicBool,
 }
 
 impl Messages {
@@ -80,7 +93,16 @@ impl Messages {
         self.stops_calls.store(true, Ordering::Relaxed);
     }
 
+    /// From now on messages go to standard error, too: what is said before a driver crashes is not lost with the process.
+    pub fn echo(&self) {
+        self.is_echoed.store(true, Ordering::Relaxed);
+    }
+
     fn push(&self, message: Message) {
+        if self.is_echoed.load(Ordering::Relaxed) {
+            // Where that is closed nobody listens.
+            let _ = writeln!(std::io::stderr(), "{}", message.text);
+        }
         self.all.lock().unwrap_or_else(PoisonError::into_inner).push(message);
     }
 }
@@ -138,4 +160,23 @@ unsafe fn listed<'a, T>(first: *const T, count: u32) -> &'a [T] {
     }
     // SAFETY: as the caller promises.
     unsafe { std::slice::from_raw_parts(first, count as usize) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn handles_do_not_tell_messages_apart_and_calls_do() {
+        let message = |text: &str| Message {
+            rule: "a rule".into(),
+            is_error: false,
+            text: text.into(),
+            objects: Vec::new(),
+            passes: Vec::new(),
+        };
+        let first = message("0x7f01[queue] vkCmdWriteTimestamp2 0xAb");
+        assert!(first.is_like(&message("0x9[queue] vkCmdWriteTimestamp2 0x1")));
+        assert!(!first.is_like(&message("0x7f01[queue] vkCmdPipelineBarrier2 0xAb")));
+    }
 }

@@ -26,18 +26,18 @@ fn rendered(gpu: &Gpu, shot: &Shot) -> Result<Rendered> {
 }
 
 /// The device is lost with one submission after the other: an error each time, nothing is left, and a new device renders the same.
-pub fn lost(session: &mut Session<'_>, model: Model) -> Verdict {
-    let shot = Shot::plain(model, None);
+pub fn lost(session: &mut Session<'_>, shot: &Shot) -> Verdict {
     let gpu = session.open()?;
-    let whole = rendered(&gpu, &shot)?;
+    shot.is_for(&gpu)?;
+    let whole = rendered(&gpu, shot)?;
     let submissions = gpu.submissions();
     drop(gpu);
     let places: BTreeSet<_> = (0..PLACES).map(|place| place * (submissions - 1) / (PLACES - 1)).collect();
-    session.fact(format!("lost at {} of {submissions} submissions", places.len()));
+    let mut losses = 0;
     for &place in &places {
         let gpu = session.open_with(Handicap { lost_after: Some(place), ..Handicap::default() })?;
-        match rendered(&gpu, &shot) {
-            Err(Error::Gpu(GpuError::Lost)) => {}
+        match rendered(&gpu, shot) {
+            Err(Error::Gpu(GpuError::Lost)) => losses += 1,
             Err(error) => {
                 return Err(Trouble::Failed(format!("lost at submission {place}, it says: {}", error.in_full())));
             }
@@ -46,22 +46,23 @@ pub fn lost(session: &mut Session<'_>, model: Model) -> Verdict {
             Ok(_) => return Err(Trouble::Failed(format!("lost at submission {place}, it goes on"))),
         }
     }
-    let again = rendered(&session.open()?, &shot)?;
+    session.fact(format!("lost at {losses} of {submissions} submissions"));
+    let again = rendered(&session.open()?, shot)?;
     hold(again.radiance == whole.radiance, || "a device opened afterwards renders another picture".into())
 }
 
 /// Less and less memory: an error that says so, or the same picture, and nothing is left.
-pub fn memory(session: &mut Session<'_>, model: Model) -> Verdict {
-    let shot = Shot::plain(model, None);
+pub fn memory(session: &mut Session<'_>, shot: &Shot) -> Verdict {
     let gpu = session.open()?;
-    let whole = rendered(&gpu, &shot)?;
+    shot.is_for(&gpu)?;
+    let whole = rendered(&gpu, shot)?;
     let peak = gpu.peak_bytes();
     drop(gpu);
     let mut refused = 0;
     for place in 0..=PLACES {
         let budget = peak * u64::from(place) / u64::from(PLACES);
         let gpu = session.open_with(Handicap { memory: Some(budget), ..Handicap::default() })?;
-        match rendered(&gpu, &shot) {
+        match rendered(&gpu, shot) {
             Ok(picture) => {
                 hold(picture.radiance == whole.radiance, || format!("with {budget} bytes it is another picture"))?;
             }
@@ -72,7 +73,7 @@ pub fn memory(session: &mut Session<'_>, model: Model) -> Verdict {
         }
     }
     session.fact(format!("of {} budgets up to {peak} bytes {refused} were too small", PLACES + 1));
-    hold(refused >= PLACES, || format!("only {refused} of {PLACES} budgets below what it takes were too small"))
+    hold(refused == PLACES, || format!("{refused} of {} budgets were too small, where {PLACES} are", PLACES + 1))
 }
 
 /// A device without ray queries, or without a clock, renders the same.
@@ -127,6 +128,7 @@ pub fn window(session: &mut Session<'_>) -> Verdict {
         Trouble::Skipped("no driver here has VK_EXT_headless_surface: nothing can be shown where nobody sees".into())
     };
     let Some(instance) = Instance::headless(session.watch())? else { return Err(none()) };
+    session.listen(&instance);
     let surface = Surface::headless(&instance)?;
     let info = instance.devices()?.into_iter().nth(session.place.device).ok_or(GpuError::NoDevice)?;
     if !surface.takes(&info) {

@@ -8,7 +8,7 @@ use xxhash_rust::xxh3::xxh3_128;
 
 use super::known;
 use super::record::{Outcome, Picture, Record, Said};
-use crate::gpu::{Gpu, GpuError, Handicap, Instance, Messages, Watch, Witness};
+use crate::gpu::{Gpu, GpuError, Handicap, Instance, Message, Messages, Watch, Witness};
 use crate::image::{FloatImage, OutputFile};
 use crate::regress::shown;
 use crate::{Error, Result};
@@ -81,25 +81,19 @@ impl<'a> Session<'a> {
             record.reasons.push(format!("{holders} things still hold the device after the check, and {bytes} bytes"));
         }
         for message in opened.iter().flat_map(|messages| messages.all()) {
-            match record.said.iter_mut().find(|said| said.message.is_like(&message)) {
-                Some(said) => said.times += 1,
-                None => {
-                    let allowed = known::allowed(&message, watch).map(String::from);
-                    record.said.push(Said { message, times: 1, allowed });
-                }
-            }
+            hear(&mut record, message, None, watch);
         }
-        let counts: usize = record.said.iter().filter(|said| said.allowed.is_none()).map(|said| said.times).sum();
-        if let Some(first) = record.said.iter().find(|said| said.allowed.is_none()) {
+        let counting: Vec<_> = record.said.iter().filter(|said| said.allowed.is_none()).collect();
+        if let Some(first) = counting.first() {
+            let count: usize = counting.iter().map(|said| said.times).sum();
             let first = first.message.text.lines().next().unwrap_or_default();
-            record.reasons.push(format!("the validation layer has {counts} messages, the first: {first}"));
+            record.reasons.push(format!("the validation layer has {count} messages, the first: {first}"));
         }
         // One that was skipped has its reason alone.
-        let is_more = record.reasons.len() > usize::from(record.outcome == Outcome::Skipped);
-        if let Some(why) = record.said.iter().find_map(|said| known::unable(&said.message)) {
-            (record.outcome, record.reasons) = (Outcome::Skipped, vec![why]);
-        } else if is_more {
+        if record.reasons.len() > usize::from(record.outcome == Outcome::Skipped) {
             record.outcome = Outcome::Failed;
+        } else if let Some(why) = record.said.iter().find_map(|said| known::unable(&said.message)) {
+            (record.outcome, record.reasons) = (Outcome::Skipped, vec![why]);
         }
         record.seconds = start.elapsed().as_secs_f64();
         record
@@ -118,7 +112,7 @@ impl<'a> Session<'a> {
 
     /// The same of an instance made for something special.
     pub fn open_in(&mut self, instance: &Arc<Instance>, handicap: Handicap) -> Result<Gpu> {
-        self.opened.push(instance.messages());
+        self.listen(instance);
         let info = instance.devices()?.into_iter().nth(self.place.device).ok_or(GpuError::NoDevice)?;
         let gpu = Gpu::open(instance, info.with_handicap(handicap))?;
         self.witnesses.push(gpu.witness());
@@ -135,9 +129,18 @@ impl<'a> Session<'a> {
         self.record.facts.push(fact.into());
     }
 
-    /// What the layer said of a planted fault: wanted, and no trouble.
-    pub fn expected(&mut self, said: impl IntoIterator<Item = Said>) {
-        self.record.said.extend(said);
+    /// From now on what is said of `instance` is of this check.
+    pub fn listen(&mut self, instance: &Instance) {
+        let messages = instance.messages();
+        if !self.opened.iter().any(|known| Arc::ptr_eq(known, &messages)) {
+            messages.echo();
+            self.opened.push(messages);
+        }
+    }
+
+    /// Something that the layer said, and why it counts for nothing, if it does not.
+    pub fn hear(&mut self, message: Message, allowed: Option<String>) {
+        hear(&mut self.record, message, allowed, self.watch);
     }
 
     /// Keeps a picture as evidence.
@@ -150,6 +153,15 @@ impl<'a> Session<'a> {
         let size = [image.width, image.height];
         self.record.pictures.push(Picture { name: name.into(), size, hash, file });
         Ok(())
+    }
+}
+
+/// The same message again is counted, not repeated.
+fn hear(record: &mut Record, message: Message, allowed: Option<String>, watch: Watch) {
+    let allowed = allowed.or_else(|| known::allowed(&message, watch).map(String::from));
+    match record.said.iter_mut().find(|said| said.message.is_like(&message) && said.allowed == allowed) {
+        Some(said) => said.times += 1,
+        None => record.said.push(Said { message, times: 1, allowed }),
     }
 }
 
@@ -240,8 +252,11 @@ mod tests {
     /// The layer tells what is left when a device goes: everything, where it is taken from under a renderer.
     #[test]
     fn everything_on_a_device_has_a_name() {
-        let Ok(instance) = Instance::watched(Watch::Synchronization) else { return };
-        let Ok(device) = instance.choose(Some("0")) else { return };
+        if run(|_| Ok(())).is_none() {
+            return;
+        }
+        let instance = Instance::watched(Watch::Synchronization).expect("the layer");
+        let device = instance.choose(Some("0")).expect("a device");
         let gpu = Gpu::open(&instance, device).expect("a device");
         let scene = Scene::of_every_effect().expect("a scene");
         let mut kinds = BTreeSet::new();
