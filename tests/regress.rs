@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use common::Validated;
+use common::{Validated, manifest};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_vitrum");
 
@@ -432,11 +432,7 @@ fn passes_on(driver: Option<&str>, part: &[&str]) {
     let report = tempfile::tempdir().expect("a folder");
     command.arg(report.path()).args(part);
     if let Some(driver) = driver {
-        let manifest = root.join(format!(".native/drivers/{driver}.json"));
-        if !manifest.is_file() {
-            println!("{driver} is not here: ci/setup.sh fetches it");
-            return;
-        }
+        let Some(manifest) = manifest(driver) else { return };
         command.env("VK_DRIVER_FILES", manifest).env_remove("VITRUM_DEVICE");
     }
     let output = command.output().expect("it starts");

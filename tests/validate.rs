@@ -4,13 +4,15 @@
 mod common;
 
 use std::fs;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Output, Stdio};
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Child, ChildStderr, Command, Output, Stdio};
 use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
-use common::Validated;
+use common::{Validated, manifest};
+use vitrum::gpu::Fault;
 use vitrum::validate::{Check, Outcome, Record, Report};
 
 const PROGRAM: &str = env!("CARGO_BIN_EXE_vitrum");
@@ -39,15 +41,6 @@ fn report(folder: &Path) -> Report {
 fn check<'r>(report: &'r Report, name: &str) -> &'r Record {
     let found = report.checks().find(|(_, check)| check.name == name);
     found.unwrap_or_else(|| panic!("no check {name}")).1
-}
-
-/// The manifest of a driver that `ci/setup.sh` fetches, if it is here.
-fn manifest(driver: &str) -> Option<PathBuf> {
-    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!(".native/drivers/{driver}.json"));
-    if !manifest.is_file() {
-        println!("{driver} is not here: ci/setup.sh fetches it");
-    }
-    manifest.is_file().then_some(manifest)
 }
 
 /// Drivers that keep nothing of what they compile do a part of the checks here, with `VITRUM_WHOLE_SUITE` all of them.
@@ -83,9 +76,8 @@ fn passes_on(driver: Option<&str>, parts: &[&str]) {
     for fault in ["missing-barrier", "wrong-layout", "leaked-buffer", "use-after-free", "out-of-bounds-index"] {
         let check = check(&report, &format!("layer/{fault}"));
         assert_eq!(check.outcome, Outcome::Passed, "{check:?}");
-        let names =
-            |name: &str| check.said.iter().any(|said| said.message.is_error && said.message.text.contains(name));
-        assert!(names("planted fault") || names("probe_bounds.comp"), "{check:?}");
+        let planted = Fault::ALL.into_iter().find(|known| known.name() == fault).expect("a fault");
+        assert!(check.said.iter().any(|said| planted.is_noticed_in(&said.message)), "{check:?}");
     }
     for (_, check) in report.checks() {
         for picture in &check.pictures {
@@ -162,55 +154,109 @@ fn workers(of: &Child) -> Vec<u32> {
     all.filter_map(|entry| entry.file_name().to_str()?.parse().ok()).filter(is_worker).collect()
 }
 
-/// Sends the first worker a signal while it renders.
-fn signalled(signal: &str, args: &[&str]) -> (tempfile::TempDir, String) {
-    let folder = tempfile::tempdir().expect("a folder");
-    let mut command = vitrum(folder.path(), &["--filter", "render/path/software/all", "--filter", "display", "-v"]);
-    let child = command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
-    let start = Instant::now();
-    // The planted faults leave no pictures: once their folder is there and some time has passed, one of the checks is at work.
-    let worker = loop {
-        match workers(&child)[..] {
-            [pid] if folder.path().join("validate-report/device-0").is_dir() => break pid,
-            _ => assert!(start.elapsed() < Duration::from_secs(60), "no worker"),
-        }
-        std::thread::sleep(Duration::from_millis(5));
-    };
-    let status = Command::new("kill").args([signal, &worker.to_string()]).status().expect("kill");
+fn send(signal: &str, process: u32) {
+    let status = Command::new("kill").args([signal, &process.to_string()]).status().expect("kill");
     assert!(status.success());
+}
+
+/// A run of `display` and `numerics`, when the first is done and the second, which takes seconds, is being done; and who does it.
+fn in_numerics(folder: &Path, args: &[&str]) -> (Child, u32, BufReader<ChildStderr>) {
+    let mut command = vitrum(folder, &["--filter", "display", "--filter", "numerics", "-v"]);
+    let mut child = command.args(args).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().expect("it starts");
+    let mut said = BufReader::new(child.stderr.take().expect("its words"));
+    let mut line = String::new();
+    while !line.starts_with("passed   display") {
+        line.clear();
+        assert!(said.read_line(&mut line).expect("a line") > 0, "display does not pass");
+    }
+    let [worker] = workers(&child)[..] else { panic!("no worker") };
+    (child, worker, said)
+}
+
+/// The numerics of a device get a signal while they are done.
+#[cfg(target_os = "linux")]
+fn signalled(signal: &str, args: &[&str]) -> (Report, String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    let (child, worker, mut rest) = in_numerics(folder.path(), args);
+    send(signal, worker);
+    let mut said = String::new();
+    rest.read_to_string(&mut said).expect("its words");
     let output = child.wait_with_output().expect("it ends");
-    assert_eq!(output.status.code(), Some(1), "{}", said(&output));
-    (folder, said(&output))
+    assert_eq!(output.status.code(), Some(1), "{said}");
+    let report = report(folder.path());
+    assert_eq!((report.count(Outcome::Passed), report.checks().count()), (6, 7), "{said}");
+    (report, said)
 }
 
 #[test]
 #[cfg(target_os = "linux")]
-fn a_crash_fails_one_check_and_the_rest_goes_on() {
+fn a_crash_fails_one_check() {
     if Validated::open().is_none() {
         return;
     }
-    let (folder, said) = signalled("-ABRT", &[]);
-    let report = report(folder.path());
-    assert_eq!((report.count(Outcome::Crashed), report.count(Outcome::Failed)), (1, 0), "{said}");
-    let crashed = report.checks().find(|(_, check)| check.outcome == Outcome::Crashed).expect("one").1;
-    assert!(crashed.reasons[0].contains("signal: 6"), "{crashed:?}");
-    assert_eq!(report.checks().count(), report.count(Outcome::Passed) + 1);
-    assert!(
-        said.contains("1 of 7 checks failed") && said.contains(&format!("{}: the process ended", crashed.name)),
-        "{said}"
-    );
+    let (report, said) = signalled("-ABRT", &[]);
+    let numerics = check(&report, "numerics");
+    assert_eq!(numerics.outcome, Outcome::Crashed);
+    assert!(numerics.reasons[0].contains("signal: 6"), "{numerics:?}");
+    assert!(said.contains("1 of 7 checks failed; ") && said.contains("numerics: the process ended"), "{said}");
 }
 
 #[test]
 #[cfg(target_os = "linux")]
-fn what_hangs_is_ended_and_the_rest_goes_on() {
+fn what_hangs_is_ended() {
     if Validated::open().is_none() {
         return;
     }
-    let (folder, said) = signalled("-STOP", &["--time-limit", "20"]);
-    let report = report(folder.path());
-    assert_eq!((report.count(Outcome::Hung), report.count(Outcome::Passed)), (1, 6), "{said}");
+    let (report, said) = signalled("-STOP", &["--time-limit", "20"]);
+    assert_eq!(check(&report, "numerics").outcome, Outcome::Hung);
     assert!(said.contains("it was not done after 20 s"), "{said}");
+}
+
+/// What is killed leaves no process, and a report that says how far it went.
+#[test]
+#[cfg(target_os = "linux")]
+fn a_run_that_is_killed_takes_its_worker_along_and_another_one_succeeds() {
+    if Validated::open().is_none() {
+        return;
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    ends(vitrum(folder.path(), &["-q", "--filter", "display"]), 0);
+    assert!(report(folder.path()).finished);
+
+    let (mut child, worker, _rest) = in_numerics(folder.path(), &[]);
+    // One run at a time has the folder.
+    let said = ends(vitrum(folder.path(), &["--filter", "display"]), 2);
+    assert!(said.contains("another run writes its report there"), "{said}");
+    child.kill().expect("it is killed");
+    child.wait().expect("it ends");
+    let start = Instant::now();
+    while Path::new(&format!("/proc/{worker}")).exists() {
+        let state = fs::read_to_string(format!("/proc/{worker}/stat")).unwrap_or_default();
+        if state.contains(") Z ") {
+            break;
+        }
+        assert!(start.elapsed() < Duration::from_secs(10), "the worker goes on");
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    let left = folder.path().join("validate-report/validate.json");
+    assert!(!left.exists() || !report(folder.path()).finished, "the report of the run before is gone");
+    ends(vitrum(folder.path(), &["-q", "--filter", "display"]), 0);
+    assert!(report(folder.path()).finished);
+}
+
+/// A manifest that drives nothing costs its own line, and the run its success.
+#[test]
+fn a_broken_driver_costs_a_line() {
+    let Some(driver) = manifest("swiftshader") else { return };
+    let folder = tempfile::tempdir().expect("a folder");
+    fs::write(folder.path().join("broken.json"), "{}").expect("a file");
+    let mut command = vitrum(folder.path(), &["--filter", "display", "--driver", "broken.json", "--driver"]);
+    command.arg(driver).env_remove("VITRUM_DEVICE");
+    let said = ends(command, 1);
+    assert!(said.contains("1 of 7 checks failed; broken.json: devices: broken.json: drives no device"), "{said}");
+    let report = report(folder.path());
+    assert_eq!((report.count(Outcome::Passed), report.messages()), (6, 0));
+    assert!(report.finished && report.devices.len() == 2);
 }
 
 #[test]
@@ -224,6 +270,8 @@ fn wrong_requests_are_refused() {
     fs::write(folder.join("text.json"), "{}").expect("a file");
     let said = ends(vitrum(folder, &["--driver", "text.json"]), 2);
     assert!(said.contains("text.json: drives no device"), "{said}");
+    let said = ends(vitrum(folder, &["--filter", "display", "--filter", "abacus"]), 2);
+    assert!(said.contains("no check has abacus in its name"), "{said}");
     let said = ends(vitrum(folder, &["--time-limit", "0"]), 2);
     assert!(said.contains("--time-limit"), "{said}");
     if Validated::open().is_some() {
@@ -232,7 +280,10 @@ fn wrong_requests_are_refused() {
         fs::create_dir(folder.join("site")).expect("a folder");
         fs::write(folder.join("site/index.html"), "mine").expect("a page");
         let said = ends(vitrum(folder, &["--filter", "display", "-o", "site"]), 2);
-        assert!(said.contains("site/index.html: is no report of this command"), "{said}");
+        assert!(said.contains("site/index.html: is of no report of this command"), "{said}");
+        fs::create_dir_all(folder.join("mine/device-0")).expect("a folder");
+        let said = ends(vitrum(folder, &["--filter", "display", "-o", "mine"]), 2);
+        assert!(said.contains("mine/device-0: is of no report of this command"), "{said}");
         assert_eq!(fs::read_to_string(folder.join("site/index.html")).expect("it is there"), "mine");
     }
     let mut command = vitrum(folder, &["--filter", "display"]);

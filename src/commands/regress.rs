@@ -81,7 +81,13 @@ impl RegressCommand {
     pub(super) fn run(self, talk: Talk) -> Result<()> {
         if let Some(Merge::Merge { parts, output }) = &self.merge {
             let (folder, report) = merged(parts, output)?;
-            return finish(&folder, &report, talk);
+            let judged = finish(&folder, &report, talk);
+            return match report.validation_messages {
+                Some(count) if count > 0 => {
+                    judged.and(Err(Error::Check(format!("the validation layer had {count} messages; see the parts"))))
+                }
+                _ => judged,
+            };
         }
         if self.device.as_deref() == Some("list") {
             return print(&devices::table(&Instance::new(/* validation: */ false)?.devices()?));

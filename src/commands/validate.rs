@@ -6,16 +6,19 @@ use std::time::{Duration, Instant};
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
-use super::{Talk, devices, print};
+use super::{Talk, print};
 use crate::gpu::Instance;
 use crate::image::OutputFile;
 use crate::options::range;
 use crate::report::{validate_html, validate_summary, validate_table};
-use crate::validate::{Check, Place, Record, Report, Run, Tested, work};
+use crate::validate::{Check, Listed, Place, Record, Report, Run, Tested, work};
 use crate::{Error, Result, shell};
 
 /// The folder of the report, where the user names none.
 const FOLDER: &str = "validate-report";
+
+/// Seconds that one check may take.
+const TIME_LIMIT: f64 = 900.0;
 
 /// Options of `vitrum validate`.
 #[derive(Debug, Args)]
@@ -46,7 +49,7 @@ pub(super) struct ValidateCommand {
     thorough: bool,
 
     /// How long one check may take, in seconds
-    #[arg(long, value_name = "SECONDS", default_value_t = 900.0, value_parser = range::positive)]
+    #[arg(long, value_name = "SECONDS", default_value_t = TIME_LIMIT, value_parser = range::positive)]
     time_limit: f64,
 
     /// Does the checks that standard input names, on the device of this index
@@ -61,9 +64,6 @@ impl ValidateCommand {
             let place = Place { device, folder, thorough: self.thorough };
             return work(place, std::io::stdin().lock(), std::io::stdout());
         }
-        if self.device.as_deref() == Some("list") {
-            return print(&devices::table(&Instance::new(/* validation: */ false)?.devices()?));
-        }
         let checks = self.checks()?;
         if self.list {
             let width = checks.iter().map(|check| check.name.len()).max().unwrap_or(0);
@@ -71,7 +71,6 @@ impl ValidateCommand {
             return print(&lines.collect::<String>());
         }
         let start = Instant::now();
-        let [loader, layer] = Instance::versions()?;
         let program = std::env::current_exe().map_err(|source| Error::file("this program", "find", source))?;
         let run = Run {
             program,
@@ -80,10 +79,14 @@ impl ValidateCommand {
             checks: &checks,
             folder,
             thorough: self.thorough,
-            patience: Duration::from_secs_f64(self.time_limit),
+            patience: Duration::try_from_secs_f64(self.time_limit).unwrap_or(Duration::MAX),
         };
+        if self.device.as_deref() == Some("list") {
+            return print(&run.table()?);
+        }
+        let [loader, layer] = Instance::versions()?;
         let devices = run.devices()?;
-        run.open_folder()?;
+        let _lock = run.open_folder()?;
         let mut report = Report {
             schema: Report::SCHEMA,
             vitrum: env!("CARGO_PKG_VERSION").into(),
@@ -91,27 +94,44 @@ impl ValidateCommand {
             system: format!("{}, {}", std::env::consts::OS, std::env::consts::ARCH),
             loader,
             layer,
+            finished: false,
             seconds: 0.0,
             devices: Vec::new(),
         };
-        for mut tested in devices {
-            let bar = progress_bar(checks.len(), &tested, talk);
-            talk.detail(&format!("device: {} ({})", tested.device.name, tested.device.driver));
-            if tested.device.missing.is_empty() {
-                run.test(&mut tested, &mut |record: &Record| {
-                    bar.inc(1);
-                    bar.set_message(record.name.clone());
-                    talk.detail(&format!("{:8} {} {:.2} s", record.outcome.name(), record.name, record.seconds));
-                })?;
-            }
-            bar.finish_and_clear();
-            report.devices.push(tested);
-            report.seconds = start.elapsed().as_secs_f64();
-            // After each: what is done is there, whatever comes.
+        let write = |report: &Report| {
             let write = |name: &str, text: String| OutputFile::new(&folder.join(name))?.write(text.as_bytes());
             write(Report::FILE, report.json())?;
-            write("index.html", validate_html(&report))?;
+            write("index.html", validate_html(report))
+        };
+        for mut tested in devices {
+            let usable = tested.device.missing.is_empty() && tested.checks.is_empty();
+            report.devices.push(tested.clone());
+            if usable {
+                let Listed { name, driver, .. } = tested.device.clone();
+                talk.note(&format!("{name} ({driver}): {} checks", checks.len()));
+                let bar = progress_bar(checks.len(), &tested, talk);
+                let mut written = Instant::now();
+                run.test(&mut tested, &mut |tested| {
+                    bar.set_position(tested.checks.len() as u64);
+                    told(tested, &bar, talk);
+                    // From time to time: what is done is there, whatever comes.
+                    if written.elapsed() > WRITES {
+                        report.devices.pop();
+                        report.devices.push(tested.clone());
+                        report.seconds = start.elapsed().as_secs_f64();
+                        write(&report)?;
+                        written = Instant::now();
+                    }
+                    Ok(())
+                })?;
+                bar.finish_and_clear();
+            }
+            report.devices.pop();
+            report.devices.push(tested);
         }
+        report.finished = true;
+        report.seconds = start.elapsed().as_secs_f64();
+        write(&report)?;
         print(&validate_table(&report, talk.quiet))?;
         talk.note(&format!("{}: {}", folder.join("index.html").display(), validate_summary(&report)));
         let bad: Vec<_> = report.checks().filter(|(_, check)| !check.outcome.is_good()).collect();
@@ -123,9 +143,10 @@ impl ValidateCommand {
 
     /// Those that are meant. Planted faults are always among them: without, silence proves nothing.
     fn checks(&self) -> Result<Vec<Check>> {
-        if Check::matching(&self.filter).is_empty() {
-            let parts = self.filter.join(", ");
-            return Err(Error::Usage(format!("--filter: no check has {parts} in its name; see --list")));
+        // A part that none has is a slip, whatever the others find.
+        let is_found = |part: &&String| !Check::matching(std::slice::from_ref(*part)).is_empty();
+        if let Some(part) = self.filter.iter().find(|part| !is_found(part)) {
+            return Err(Error::Usage(format!("--filter: no check has {part} in its name; see --list")));
         }
         let mut parts = self.filter.clone();
         parts.extend((!parts.is_empty()).then(|| "layer/".into()));
@@ -140,8 +161,30 @@ impl ValidateCommand {
         self.device.iter().for_each(|device| add("--device", device.clone()));
         self.filter.iter().for_each(|part| add("--filter", part.clone()));
         self.output.iter().for_each(|folder| add("--output", folder.display().to_string()));
+        if self.time_limit != TIME_LIMIT {
+            add("--time-limit", self.time_limit.to_string());
+        }
         words.extend(self.thorough.then(|| "--thorough".into()));
         shell::line(words.iter().map(String::as_str))
+    }
+}
+
+/// How often the report is written while checks are done.
+const WRITES: Duration = Duration::from_secs(2);
+
+/// Tells of the last check, where somebody wants that; where nobody looks at a bar, of groups of them.
+fn told(tested: &Tested, bar: &ProgressBar, talk: Talk) {
+    let [.., last] = &tested.checks[..] else { return };
+    bar.set_message(last.name.clone());
+    talk.detail(&format!("{:8} {} {:.2} s", last.outcome.name(), last.name, last.seconds));
+    let group = |check: &Record| check.name.split('/').next().unwrap_or_default().to_owned();
+    let is_wanted = bar.is_hidden() && talk.verbose == 0;
+    if let [.., before, last] = &tested.checks[..]
+        && is_wanted
+        && group(before) != group(last)
+    {
+        let done = tested.checks.len() - 1;
+        talk.note(&format!("{}: done with {}, {done} checks so far", tested.device.name, group(before)));
     }
 }
 

@@ -297,6 +297,9 @@ pub fn merged(folders: &[PathBuf], output: &Path) -> Result<(Folder, Report)> {
         let why = "is one of the parts and would be replaced; name another folder for the report of all";
         return Err(Error::input(part, 0, why));
     }
+    if let Some(part) = folders.iter().find(|folder| folder.join(UNFINISHED).exists()) {
+        return Err(Error::input(part, 0, "holds a run that was interrupted; run that part again"));
+    }
     let output = Folder::open(output)?;
     let mut pictures: Vec<Record> = Vec::new();
     for (folder, report) in folders.iter().zip(&reports) {

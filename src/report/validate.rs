@@ -9,8 +9,11 @@ pub fn table(report: &Report, only_bad: bool) -> String {
     let mut text = String::new();
     for tested in &report.devices {
         let Tested { device, checks, .. } = tested;
+        if only_bad && checks.iter().all(|check| check.outcome.is_good()) {
+            continue;
+        }
         // Writing to a string cannot fail.
-        let _ = writeln!(text, "{}, {}, Vulkan {}", device.name, device.driver, device.api);
+        let _ = writeln!(text, "{}", what(tested));
         if !device.missing.is_empty() {
             let _ = writeln!(text, "  cannot be used: it lacks {}", device.missing.join(", "));
         }
@@ -36,13 +39,24 @@ pub fn table(report: &Report, only_bad: bool) -> String {
     text
 }
 
+/// What was tested: a device and its driver, or a manifest that drives none.
+pub(super) fn what(tested: &Tested) -> String {
+    let Tested { device, manifest, .. } = tested;
+    match (device.api.is_empty(), manifest) {
+        (true, Some(manifest)) => manifest.clone(),
+        _ => format!("{}, {}, Vulkan {}", device.name, device.driver, device.api),
+    }
+}
+
 /// One line of all.
 pub fn summary(report: &Report) -> String {
-    let usable = report.devices.iter().filter(|tested| tested.device.missing.is_empty()).count();
+    let is_usable = |tested: &&Tested| tested.device.missing.is_empty() && !tested.device.api.is_empty();
+    let usable = report.devices.iter().filter(is_usable).count();
     let devices = if usable == 1 { "device" } else { "devices" };
     let (checks, messages) = (report.checks().count(), report.messages());
     let counts = counts(report.checks().map(|(_, check)| check.outcome));
-    format!("{usable} {devices}, {checks} checks in {:.0} s: {counts}; {messages} messages", report.seconds)
+    let state = if report.finished { "" } else { "not finished: " };
+    format!("{state}{usable} {devices}, {checks} checks in {:.0} s: {counts}; {messages} messages", report.seconds)
 }
 
 /// Checks whose names start alike.

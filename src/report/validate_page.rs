@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use super::numerics_page::escaped;
-use super::validate::{groups, summary};
+use super::validate::{groups, summary, what};
 use crate::validate::{Outcome, Record, Report, Said, Tested};
 
 const STYLE: &str = "\
@@ -66,11 +66,9 @@ fn device(text: &mut String, tested: &Tested) {
     // Writing to a string cannot fail.
     let _ = writeln!(
         text,
-        "<h2>{}</h2>\n<p>{}, Vulkan {}, {}, {:.1} GiB, {} ray queries{}</p>",
-        escaped(&device.name),
-        escaped(&device.driver),
-        device.api,
-        device.kind,
+        "<h2>{}</h2>\n<p>{}, {:.1} GiB, {} ray queries{}</p>",
+        escaped(&what(tested)),
+        if device.kind.is_empty() { "unknown" } else { &device.kind },
         device.memory_bytes as f64 / f64::from(1 << 30),
         if device.ray_query { "with" } else { "without" },
         manifest.as_ref().map_or(String::new(), |manifest| format!("; <code>{}</code>", escaped(manifest)))
@@ -78,7 +76,7 @@ fn device(text: &mut String, tested: &Tested) {
     if !device.missing.is_empty() {
         let _ = writeln!(text, "<p>Cannot be used: it lacks {}.</p>", escaped(&device.missing.join(", ")));
     }
-    if checks.iter().any(|check| check.name == "numerics" && check.outcome != Outcome::Crashed) {
+    if checks.iter().any(|check| check.name == "numerics" && !check.facts.is_empty()) {
         let _ = writeln!(text, "<p><a href=\"{folder}/numerics/index.html\">The numerics table of this device</a></p>");
     }
     for group in groups(checks) {

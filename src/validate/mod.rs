@@ -9,6 +9,7 @@ mod hardship;
 mod known;
 mod numbers;
 mod pictures;
+mod process;
 mod record;
 mod run;
 mod session;

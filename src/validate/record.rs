@@ -110,7 +110,7 @@ pub struct Tested {
 }
 
 /// A device as `vitrum devices --json` lists it.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[allow(missing_docs, reason = "docs/validate.md describes the members")]
 pub struct Listed {
     pub index: usize,
@@ -134,6 +134,8 @@ pub struct Report {
     pub system: String,
     pub loader: String,
     pub layer: String,
+    /// Whether everything was done; what was interrupted is kept as far as it went.
+    pub finished: bool,
     pub seconds: f64,
     pub devices: Vec<Tested>,
 }

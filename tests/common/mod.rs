@@ -8,10 +8,20 @@ pub mod reference;
 pub mod tables;
 
 use std::io::Write;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use vitrum::gpu::{Gpu, GpuError, Instance};
+
+/// The manifest of a driver that `ci/setup.sh` fetches where the distribution has it. Without it the test is skipped, aloud.
+pub fn manifest(driver: &str) -> Option<PathBuf> {
+    let manifest = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!(".native/drivers/{driver}.json"));
+    if !manifest.is_file() {
+        let _ = writeln!(std::io::stderr(), "skipped: no driver {driver}; ci/setup.sh fetches it where it can be had");
+    }
+    manifest.is_file().then_some(manifest)
+}
 
 /// A device under validation with synchronization validation. [`Validated::verdict`] ends every test.
 pub struct Validated {
