@@ -52,6 +52,8 @@ impl Run<'_> {
         let mut failures = Vec::new();
         let wanted = self.device.as_deref().filter(|wanted| !wanted.is_empty());
         for manifest in self.manifests() {
+            // One that is not there is a slip, not a driver.
+            self.command(manifest)?;
             let listed = match self.listed(manifest) {
                 Ok(listed) => listed,
                 Err((outcome, error)) => {
