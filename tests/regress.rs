@@ -158,7 +158,11 @@ fn what_cannot_be_compared_fails() {
     fs::write(&reference, &whole).expect("a reference");
     ends(folder, "regress -o report", 0);
     fs::write(folder.join("regress.toml"), SUITE.replace("size = [24, 18]", "size = [24, 16]")).expect("a suite");
-    fails("regress -o report", 1, "tree: the reference was made with --model=tree --size=24x18 --samples=2");
+    fails(
+        "regress -o report",
+        1,
+        "tree: the reference was made with --size=24x18, this with --size=24x16; make it again",
+    );
     fs::write(folder.join("regress.toml"), SUITE.replace("samples = 64", "samples = 4")).expect("a suite");
     fails("regress -o report --bless=path", 1, "4 samples are too few to judge by their spread");
     // A scene that cannot be read is one picture's fault.
