@@ -35,11 +35,12 @@ while IFS=';' read -r name file change; do
         exit 2
     fi
     (cd "$copy" && cargo build --release --locked --quiet)
-    if (cd "$copy" && target/release/vitrum regress tests/regress/suite.toml -q -o regress-report >seen.txt 2>/dev/null); then
+    (cd "$copy" && target/release/vitrum regress tests/regress/suite.toml -q -o regress-report >seen.txt 2>/dev/null) || true
+    seen=$(awk '/^FAILED/ { print $2 }' "$copy/seen.txt" | tr '\n' ' ')
+    if [ -z "$seen" ]; then
         echo "$name: NOT SEEN"
         status=1
     else
-        seen=$(awk '/^FAILED/ { print $2 }' "$copy/seen.txt" | tr '\n' ' ')
         echo "$name: seen by $(wc -w <<<"$seen"): $seen"
     fi
 done <<<"$faults"
