@@ -12,8 +12,10 @@ mod containment;
 mod environment;
 mod file;
 mod files;
+mod gltf;
 mod material;
 mod mesh;
+mod mesh_file;
 mod mtl;
 mod obj;
 mod obj_text;
@@ -43,7 +45,7 @@ use crate::options::RenderArgs;
 use crate::{Error, Result};
 use assembly::{Assembly, Placement, Wear};
 use file::{EnvironmentTable, Light, SceneFile};
-use obj::shorten;
+use mesh_file::{MeshFile, shorten};
 
 /// Everything that a picture shows.
 #[derive(Clone, Debug)]
@@ -126,8 +128,14 @@ impl Scene {
         let mut scene = match extension.as_deref() {
             Some("toml") => Self::from_file(file::read(Files::Disk, path)?, name, overrides),
             Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path)?, name, overrides),
-            _ if path.is_dir() => Err(Error::input(path, 0, "is a folder; name a .toml (scene) or .obj (mesh) in it")),
-            _ => Err(Error::input(path, 0, "is no scene of a known kind; known: .toml (scene), .obj (mesh)")),
+            _ if path.is_dir() => {
+                Err(Error::input(path, 0, "is a folder; name a .toml (scene), .glb, .gltf or .obj (mesh) in it"))
+            }
+            _ => Err(Error::input(
+                path,
+                0,
+                "is no scene of a known kind; known: .toml (scene), .glb, .gltf, .obj (mesh)",
+            )),
         }?;
         scene.files.push(path.into());
         Ok(scene)
@@ -271,19 +279,24 @@ fn warn_of_missing_uvs(
     shorten(warnings, before, "meshes lack texture coordinates");
 }
 
-/// A mesh of clear glass in the default environment.
+/// A mesh file in the default environment: glTF as the scene that it is, anything else as clear glass.
 fn bare_mesh(path: &Path) -> Result<SceneFile> {
-    assembly::check_mesh_kind(path).map_err(|message| Error::input(path, 0, message))?;
+    mesh_file::check_kind(path).map_err(|message| Error::input(path, 0, message))?;
     let mut assembly = Assembly::default();
-    let place = Placement { number: 0, transform: DAffine3::IDENTITY, smooth: true };
-    assembly.add(Files::Disk, path, Wear::ClearGlass, &place)?;
-    Ok(SceneFile {
-        environment: EnvironmentTable::default(),
-        camera: None,
-        lights: Vec::new(),
-        render: RenderArgs::default(),
-        assembly,
-    })
+    let (wear, number) = match mesh_file::is_gltf(path) {
+        true => (Wear::Own, None),
+        false => (Wear::ClearGlass, Some(0)),
+    };
+    let place = Placement { number, transform: DAffine3::IDENTITY, smooth: true };
+    let (mut camera, mut lights, mut warnings) = (None, Vec::new(), Vec::new());
+    if let Some(file) = assembly.add(Files::Disk, path, wear, &place)? {
+        let MeshFile { camera: own, lights: all, scene_warnings, .. } = file;
+        (camera, lights, warnings) = (*own, std::mem::take(all), std::mem::take(scene_warnings));
+    }
+    assembly.warnings.append(&mut warnings);
+    assembly.check_reach(0).map_err(|message| Error::input(path, 0, message))?;
+    let (environment, render) = (EnvironmentTable::default(), RenderArgs::default());
+    Ok(SceneFile { environment, camera, lights, render, assembly })
 }
 
 impl Overrides {
