@@ -1,8 +1,15 @@
-//! Hostile files: whatever the scene, OBJ, MTL and image readers are given, they answer with a value or an error, in
+//! Hostile files: whatever the scene, OBJ, MTL, glTF and image readers are given, they answer with a value or an error, in
 //! little time and memory, and never panic.
 //!
 //! Cases are valid seeds, mutated. Short by default; `VITRUM_FUZZ_SECONDS` sets the length of each test. A failure
 //! leaves the case in a file and prints its name.
+
+#[allow(dead_code, reason = "each test program uses its share")]
+#[path = "common/gltf.rs"]
+mod gltf;
+#[allow(dead_code, reason = "each test program uses its share")]
+#[path = "tree/shapes.rs"]
+mod shapes;
 
 use std::fs;
 use std::io::Cursor;
@@ -10,7 +17,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use vitrum::scene::{Overrides, Scene, Surface, Texels, Texture};
+use serde_json::json;
+use vitrum::scene::{Mesh, Overrides, Scene, Surface, Texels, Texture};
 
 /// The longest that one case may take.
 const SLOWEST: Duration = Duration::from_secs(2);
@@ -236,16 +244,20 @@ impl Folder {
 
     /// Whether the scene can be read; what it holds must be sound.
     fn load(&self) -> bool {
-        match Scene::load(Some(&self.scene), &Overrides::default()) {
-            Ok(scene) => {
-                check(&scene);
-                true
-            }
-            Err(error) => {
-                assert_eq!(error.exit_code(), 2);
-                assert!(!error.to_string().contains('\n'), "{error}");
-                false
-            }
+        loads(&self.scene)
+    }
+}
+
+fn loads(scene: &Path) -> bool {
+    match Scene::load(Some(scene), &Overrides::default()) {
+        Ok(scene) => {
+            check(&scene);
+            true
+        }
+        Err(error) => {
+            assert_eq!(error.exit_code(), 2);
+            assert!(!error.to_string().contains('\n'), "{error}");
+            false
         }
     }
 }
@@ -296,6 +308,68 @@ fn obj_files() {
             folder.load()
         },
     );
+}
+
+/// A model with something of everything that is read.
+fn model() -> gltf::Model {
+    let mut model = gltf::Model::new();
+    let mut png = Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(2, 1, image::Rgb([255, 0, 188])).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let view = model.view(&png.into_inner());
+    model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
+    model.push("textures", json!({ "source": 0 }));
+    let transform = json!({ "offset": [0.5, 0.5], "rotation": 0.5, "scale": [2, 2] });
+    model.push(
+        "materials",
+        json!({ "name": "wood", "emissiveFactor": [1, 1, 1], "pbrMetallicRoughness": {
+        "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0, "roughnessFactor": 0.5, "baseColorTexture": {
+            "index": 0, "extensions": { "KHR_texture_transform": transform } } } }),
+    );
+    model.push(
+        "materials",
+        json!({ "name": "glass", "pbrMetallicRoughness": { "metallicFactor": 0 }, "extensions": {
+        "KHR_materials_transmission": { "transmissionFactor": 1 }, "KHR_materials_ior": { "ior": 1.5 },
+        "KHR_materials_volume": { "thicknessFactor": 1, "attenuationColor": [1, 0.5, 0.5], "attenuationDistance": 1 },
+        "KHR_materials_dispersion": { "dispersion": 0.5 } } }),
+    );
+    let quad = shapes::rectangle(2.0, 2.0);
+    let quad = Mesh { uvs: vec![[0.0, 1.0]; quad.positions.len()], ..quad };
+    let primitives = [model.primitive(&quad, Some(0)), model.primitive(&shapes::icosphere(0), Some(1))];
+    let mesh = model.mesh(&primitives);
+    let places = model.view(&[0, 1]);
+    let values = model.view(&[0; 24]);
+    let sparse = json!({ "componentType": gltf::F32, "type": "VEC3", "count": 4, "min": [0, 0, 0], "max": [1, 1, 1],
+        "sparse": { "count": 2, "indices": { "bufferView": places, "componentType": gltf::U8 },
+            "values": { "bufferView": values } } });
+    let positions = model.push("accessors", sparse);
+    let strip = model.mesh(&[json!({ "attributes": { "POSITION": positions }, "mode": 5 })]);
+    model.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.6, "znear": 0.1 } }));
+    model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 8 }] } });
+    let inner =
+        model.push("nodes", json!({ "mesh": mesh, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] }));
+    model.node(json!({ "children": [inner], "translation": [1, 0, 0], "rotation": [0, 0, 0, 1], "scale": [1, 2, 1] }));
+    model.node(json!({ "camera": 0, "translation": [0, 0, 5] }));
+    model.node(json!({ "mesh": strip, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    model
+}
+
+#[test]
+fn gltf_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("fuzz.gltf");
+    // One value a line, for what swaps lines and words.
+    let text: serde_json::Value = serde_json::from_str(&model().embedded()).unwrap();
+    let text = serde_json::to_string_pretty(&text).unwrap().replace(": ", " : ").into_bytes();
+    let binary = model().glb();
+    let seeds = [text, binary];
+    let make = |random: &mut Random| match random.one_in(2) {
+        true => mutated_text(random, &seeds[0], &seeds[..1]),
+        false => mutated(random, &seeds[1], &seeds),
+    };
+    fuzz("gltf", make, |bytes| {
+        fs::write(&scene, bytes).unwrap();
+        loads(&scene)
+    });
 }
 
 #[test]

@@ -14,8 +14,9 @@ use std::path::Path;
 
 use glam::{DAffine3, DMat4, DQuat, DVec3};
 use gltf::camera::Projection;
-use gltf::json::validation::{Error as Invalid, Validate};
+use gltf::json::validation::{Checked, Error as Invalid, Validate};
 use gltf::khr_lights_punctual::Kind;
+use gltf::mesh::Semantic;
 use gltf::scene::Transform;
 use gltf::{Document, Node, json};
 
@@ -145,6 +146,13 @@ fn check(root: &json::Root) -> Result<(), String> {
     let unknown = |name: &&String| !KNOWN.contains(&name.as_str());
     if let Some(name) = root.extensions_required.iter().find(unknown) {
         return Err(format!("requires {name}, which is not supported; export it without"));
+    }
+    // Before it is validated, for the crate counts on it.
+    let positions = Checked::Valid(Semantic::Positions);
+    for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
+        if primitive.attributes.get(&positions).is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
+            return Err("positions are in an accessor that does not exist; the file is damaged, export it again".into());
+        }
     }
     let mut first = None;
     root.validate(root, json::Path::new, &mut |place, error| {
