@@ -17,7 +17,7 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use serde_json::json;
+use serde_json::{Value, json};
 use vitrum::scene::{Mesh, Overrides, Scene, Surface, Texels, Texture};
 
 /// The longest that one case may take.
@@ -67,7 +67,7 @@ fn mutated(random: &mut Random, seed: &[u8], others: &[Vec<u8>]) -> Vec<u8> {
             0 if !bytes.is_empty() => bytes[at] ^= 1 << random.below(8),
             1 if !bytes.is_empty() => bytes[at] = random.next() as u8,
             2 => bytes.truncate(at),
-            3 => {
+            3 if !others.is_empty() => {
                 let other = random.pick(others).clone();
                 let (from, to) = (random.range(&other), random.range(&bytes));
                 bytes.splice(to, other[from].iter().copied());
@@ -353,6 +353,57 @@ fn model() -> gltf::Model {
     model
 }
 
+/// Puts hostile values in the place of some, and leaves it well formed.
+fn mutate_json(random: &mut Random, value: &mut Value) {
+    let count = match value {
+        Value::Object(members) => members.len(),
+        Value::Array(list) => list.len(),
+        _ => 0,
+    };
+    let place = random.below(count);
+    let inner = match value {
+        Value::Object(members) => members.values_mut().nth(place),
+        Value::Array(list) => list.get_mut(place),
+        _ => None,
+    };
+    match inner {
+        Some(inner) if !random.one_in(12) => mutate_json(random, inner),
+        _ => match (random.below(4), &mut *value) {
+            (0, Value::Array(list)) if !list.is_empty() => list.push(list[place].clone()),
+            (1, Value::Array(list)) => drop(list.pop()),
+            (2, Value::Object(members)) => {
+                let key = members.keys().nth(place).cloned();
+                drop(key.and_then(|key| members.remove(&key)));
+            }
+            _ => {
+                let hostile = [
+                    json!(0),
+                    json!(1),
+                    json!(2),
+                    json!(3),
+                    json!(5),
+                    json!(-1),
+                    json!(0.5),
+                    json!(1e-40),
+                    json!(1e39),
+                    json!(-1e30),
+                    json!(u32::MAX),
+                    json!(u64::MAX),
+                    json!(5121),
+                    json!(5123),
+                    json!(""),
+                    json!("VEC2"),
+                    json!("data:,"),
+                    json!([]),
+                    json!({}),
+                    json!(null),
+                ];
+                *value = random.pick(&hostile).clone();
+            }
+        },
+    }
+}
+
 #[test]
 fn gltf_files() {
     let folder = tempfile::tempdir().unwrap();
@@ -362,9 +413,19 @@ fn gltf_files() {
     let text = serde_json::to_string_pretty(&text).unwrap().replace(": ", " : ").into_bytes();
     let binary = model().glb();
     let seeds = [text, binary];
-    let make = |random: &mut Random| match random.one_in(2) {
-        true => mutated_text(random, &seeds[0], &seeds[..1]),
-        false => mutated(random, &seeds[1], &seeds),
+    let make = |random: &mut Random| match random.below(4) {
+        0 => mutated_text(random, &seeds[0], &seeds[..1]),
+        1 => mutated(random, &seeds[1], &seeds),
+        _ => {
+            let mut changed = model();
+            for _ in 0..1 + random.below(3) {
+                mutate_json(random, &mut changed.json);
+            }
+            if random.one_in(4) {
+                changed.buffer = mutated(random, &changed.buffer, &[]);
+            }
+            changed.glb()
+        }
     };
     fuzz("gltf", make, |bytes| {
         fs::write(&scene, bytes).unwrap();

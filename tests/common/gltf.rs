@@ -110,10 +110,10 @@ impl Model {
         if let Some(uri) = uri {
             buffer["uri"] = uri.into();
         }
-        json["buffers"] = json!([buffer]);
-        json.as_object_mut()
-            .expect("an object")
-            .retain(|_, value| value.as_array().is_none_or(|list| !list.is_empty()));
+        if let Some(all) = json.as_object_mut() {
+            all.insert("buffers".into(), json!([buffer]));
+            all.retain(|_, value| value.as_array().is_none_or(|list| !list.is_empty()));
+        }
         json.to_string()
     }
 

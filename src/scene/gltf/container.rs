@@ -95,18 +95,29 @@ impl Resources<'_> {
         Ok(all)
     }
 
-    /// Where the bytes of an image are; the error says why there are none.
-    pub fn image(&self, image: &gltf::Image, buffers: &[Cow<'_, [u8]>]) -> Result<ImageSource, String> {
+    /// Where the bytes of the image `number` are; the error says why there are none.
+    pub fn image(
+        &self,
+        document: &gltf::Document,
+        number: usize,
+        buffers: &[Cow<'_, [u8]>],
+    ) -> Result<ImageSource, String> {
         let embedded = |bytes: &[u8]| {
-            let name = PathBuf::from(format!("{}#image{}", self.path.display(), image.index()));
+            let name = PathBuf::from(format!("{}#image{number}", self.path.display()));
             ImageSource::Embedded { name, bytes: Arc::from(bytes) }
         };
-        match image.source() {
-            gltf::image::Source::View { view, .. } => slice(&view, buffers).map(embedded),
-            gltf::image::Source::Uri { uri, .. } => match data_uri(uri) {
+        // As JSON has it: the crate wants to know its kind, which its bytes tell.
+        let image = document.as_json().images.get(number).ok_or("it does not exist")?;
+        match (&image.buffer_view, &image.uri) {
+            (Some(view), _) => {
+                let view = document.views().nth(view.value()).ok_or("its buffer view does not exist")?;
+                slice(&view, buffers).map(embedded)
+            }
+            (None, Some(uri)) => match data_uri(uri) {
                 Some(bytes) => bytes.map(|bytes| embedded(&bytes)),
                 None => self.beside(uri).map(ImageSource::File).map_err(|error| error.to_string()),
             },
+            (None, None) => Err("it has neither bytes nor a file".into()),
         }
     }
 

@@ -14,6 +14,7 @@
 use std::borrow::Cow;
 
 use glam::{DMat2, DVec2, DVec3};
+use gltf::Document;
 use gltf::material::{AlphaMode, Material as Source};
 use gltf::texture::Info;
 
@@ -44,6 +45,7 @@ impl Default for Coordinates {
 
 /// Converts materials, one after the other.
 pub struct Converter<'a> {
+    pub document: &'a Document,
     pub resources: &'a Resources<'a>,
     pub buffers: &'a [Cow<'a, [u8]>],
     pub images: Vec<Image>,
@@ -163,7 +165,7 @@ impl Converter<'_> {
             }
         };
         let image = match info.texture().source() {
-            Some(image) => self.resources.image(&image, self.buffers),
+            Some(image) => self.resources.image(self.document, image.index(), self.buffers),
             None => Err("it is of a kind that is not read; known: PNG, JPEG".into()),
         };
         match image {

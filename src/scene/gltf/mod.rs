@@ -96,8 +96,13 @@ pub fn read(files: Files, path: &Path) -> Result<MeshFile> {
     let mut resources = Resources { files, path, read: Vec::new() };
     let buffers = resources.buffers(&document, binary)?;
     let mut of_materials = Remarks::default();
-    let mut converter =
-        Converter { resources: &resources, buffers: &buffers, images: Vec::new(), remarks: &mut of_materials };
+    let mut converter = Converter {
+        document: &document,
+        resources: &resources,
+        buffers: &buffers,
+        images: Vec::new(),
+        remarks: &mut of_materials,
+    };
     let (materials, coordinates): (Vec<_>, Vec<_>) =
         document.materials().map(|material| converter.convert(&material)).unzip();
     let images = converter.images;
