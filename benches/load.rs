@@ -1,4 +1,4 @@
-//! How long a large mesh takes to read, and how much memory: `cargo bench --bench load` prints the table of docs/models.md, of 5
+//! How long a large mesh takes to read, and how much memory: `cargo bench --bench load` prints the table of docs/gltf.md, of 5
 //! million triangles in OBJ and in GLB. Beside it stands what the readers need alone that it is built on: `tobj` for OBJ, for GLB the
 //! `gltf` crate with arrays copied out. An argument is another number of triangles.
 //!

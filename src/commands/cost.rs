@@ -34,7 +34,7 @@ const NO_FOLDER: &str = "is a file; the report is a folder: name one";
     after_help = "docs/cost.md says how it is measured, and has the members of cost.json."
 )]
 pub(super) struct CostCommand {
-    /// A .toml scene, or a bare .obj shown as clear glass; none: the built-in teapot and cups
+    /// A .toml scene, a .glb or .gltf, or a bare .obj shown as clear glass; none: the built-in teapot and cups
     scene: Option<PathBuf>,
 
     /// Folder for cost.json, index.html, the pictures, and the reference, which a later run goes on with

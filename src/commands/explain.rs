@@ -21,7 +21,7 @@ const PLAN: &str = "What `render --model auto` would do";
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct ExplainCommand {
-    /// A .toml scene, or a bare .obj shown as clear glass; none: the built-in teapot and cups
+    /// A .toml scene, a .glb or .gltf, or a bare .obj shown as clear glass; none: the built-in teapot and cups
     scene: Option<PathBuf>,
 
     /// JSON instead of text

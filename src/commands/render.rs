@@ -24,7 +24,7 @@ const MOST_BODIES: usize = 8;
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct RenderCommand {
-    /// A .toml scene, or a bare .obj shown as clear glass; none: the built-in teapot and cups
+    /// A .toml scene, a .glb or .gltf, or a bare .obj shown as clear glass; none: the built-in teapot and cups
     scene: Option<PathBuf>,
 
     /// The image: .exr (linear radiance) or .png (tone mapped, sRGB)

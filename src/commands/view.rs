@@ -14,7 +14,7 @@ use crate::{Error, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 pub(super) struct ViewCommand {
-    /// A .toml scene, or a bare .obj shown as clear glass; none: the built-in teapot and cups
+    /// A .toml scene, a .glb or .gltf, or a bare .obj shown as clear glass; none: the built-in teapot and cups
     scene: Option<PathBuf>,
 
     #[command(flatten)]
