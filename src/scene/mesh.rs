@@ -33,6 +33,8 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// What was wrong.
     pub faults: MeshFaults,
+    /// Where it was.
+    pub sites: FaultSites,
     /// Whether it may hold bodies that overlap.
     pub overlaps: bool,
 }
@@ -73,6 +75,19 @@ pub struct MeshFaults {
     pub replaced_uvs: usize,
     /// Normals that point to the inside of a face around them.
     pub opposed_normals: usize,
+}
+
+/// The first place of each fault, in the mesh's space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FaultSites {
+    /// The middle of an edge of one triangle only.
+    pub open_edge: Option<DVec3>,
+    /// The middle of an edge of more than two triangles.
+    pub non_manifold_edge: Option<DVec3>,
+    /// The middle of an edge whose triangles do not agree.
+    pub inconsistent_edge: Option<DVec3>,
+    /// A vertex of a shell that was inside out.
+    pub inverted_shell: Option<DVec3>,
 }
 
 /// Why a mesh cannot be used.
@@ -176,7 +191,7 @@ impl Mesh {
         if let Some(first) = triangles.iter().position(bad) {
             return Err(Refusal::BadIndices { count: triangles.iter().filter(|t| bad(t)).count(), first, vertices });
         }
-        let Topology { inverted: turned, overlaps } = topology::analyse(&positions, &triangles, &mut faults);
+        let Topology { inverted: turned, overlaps, sites } = topology::analyse(&positions, &triangles, &mut faults);
         let mut inverted = vec![false; if turned.is_empty() { 0 } else { vertices }];
         for number in turned {
             let triangle = &mut triangles[number as usize];
@@ -193,7 +208,7 @@ impl Mesh {
         let mut used = vec![false; vertices];
         triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
         faults.unused_vertices = used.iter().filter(|used| !**used).count();
-        let mut mesh = Self { name, positions, normals, uvs, triangles, faults, overlaps };
+        let mut mesh = Self { name, positions, normals, uvs, triangles, faults, sites, overlaps };
         if mesh.normals.len() != vertices {
             mesh.normals.clear();
         }
@@ -266,7 +281,7 @@ impl Mesh {
 }
 
 /// The normal with the length of twice the area.
-fn area_vector(positions: &[[f32; 3]], triangle: [u32; 3]) -> DVec3 {
+pub fn area_vector(positions: &[[f32; 3]], triangle: [u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|vertex| {
         let [x, y, z] = positions[vertex as usize];
         DVec3::new(x.into(), y.into(), z.into())

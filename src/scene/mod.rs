@@ -9,6 +9,7 @@ mod bounds;
 mod builtin;
 mod camera;
 mod containment;
+mod doctor;
 mod environment;
 mod file;
 mod files;
@@ -23,6 +24,7 @@ pub(crate) mod table;
 mod texture;
 mod topology;
 mod touching;
+mod walls;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -32,10 +34,11 @@ use glam::{DAffine3, DVec3};
 
 pub use bounds::Bounds;
 pub use camera::Camera;
+pub use doctor::{Ailment, Diagnosis, Finding, Nest, Nesting};
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
 pub(crate) use files::Files;
 pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
-pub use mesh::{Mesh, MeshFaults, RawMesh, Refusal};
+pub use mesh::{FaultSites, Mesh, MeshFaults, RawMesh, Refusal};
 pub use texture::{Texels, Texture};
 pub use touching::Touch;
 
@@ -110,6 +113,8 @@ pub struct Overrides {
     pub environment: Option<PathBuf>,
     /// Single values, as [`Scene::set`] takes them; they win over the others.
     pub settings: Vec<String>,
+    /// Meshes are repaired, or not, whatever the scene's own render options say: docs/doctor.md.
+    pub repair: Option<bool>,
     /// The scene's own render options count for nothing.
     pub no_render_table: bool,
 }
@@ -124,8 +129,8 @@ impl Scene {
         let name = path.display().to_string();
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let mut scene = match extension.as_deref() {
-            Some("toml") => Self::from_file(file::read(Files::Disk, path)?, name, overrides),
-            Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path)?, name, overrides),
+            Some("toml") => Self::from_file(file::read(Files::Disk, path, overrides)?, name, overrides),
+            Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path, overrides)?, name, overrides),
             _ if path.is_dir() => Err(Error::input(path, 0, "is a folder; name a .toml (scene) or .obj (mesh) in it")),
             _ => Err(Error::input(path, 0, "is no scene of a known kind; known: .toml (scene), .obj (mesh)")),
         }?;
@@ -144,7 +149,7 @@ impl Scene {
     }
 
     fn built_in(path: &str, name: &str, overrides: &Overrides) -> Result<Self> {
-        Self::from_file(file::read(Files::BuiltIn, Path::new(path))?, name.into(), overrides)
+        Self::from_file(file::read(Files::BuiltIn, Path::new(path), overrides)?, name.into(), overrides)
     }
 
     fn from_file(file: SceneFile, name: String, overrides: &Overrides) -> Result<Self> {
@@ -272,9 +277,9 @@ fn warn_of_missing_uvs(
 }
 
 /// A mesh of clear glass in the default environment.
-fn bare_mesh(path: &Path) -> Result<SceneFile> {
+fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
     assembly::check_mesh_kind(path).map_err(|message| Error::input(path, 0, message))?;
-    let mut assembly = Assembly::default();
+    let mut assembly = Assembly::new(overrides.repair);
     let place = Placement { number: 0, transform: DAffine3::IDENTITY, smooth: true };
     assembly.add(Files::Disk, path, Wear::ClearGlass, &place)?;
     Ok(SceneFile {
@@ -294,6 +299,7 @@ impl Overrides {
             roughness: args.roughness,
             environment: args.env.clone(),
             settings: args.set.clone().unwrap_or_default(),
+            repair: args.repair,
             no_render_table: args.no_render_table == Some(true),
         }
     }

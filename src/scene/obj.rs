@@ -7,6 +7,7 @@
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
+use super::doctor::{Mending, mend};
 use super::files::Files;
 use super::material::Material;
 use super::mesh::{Mesh, RawMesh, Refusal};
@@ -38,8 +39,8 @@ pub struct Part {
     pub material: Option<usize>,
 }
 
-/// Reads the `.obj` at `path` and the `.mtl` it names.
-pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
+/// Reads the `.obj` at `path` and the `.mtl` it names; `repair`s the meshes beyond what [`Mesh::new`] does.
+pub fn read(files: Files, path: &Path, repair: bool) -> Result<ObjFile> {
     let bytes = files.read(path)?;
     if bytes.contains(&0) {
         return Err(Error::input(path, 0, "is binary, not Wavefront OBJ text; export as .obj"));
@@ -69,7 +70,7 @@ pub fn read(files: Files, path: &Path) -> Result<ObjFile> {
     })?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let mut warnings: Vec<_> = tidy.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
-    let mut parts = parts(path, &file, &text, models, &mut warnings)?;
+    let mut parts = parts(path, &file, &text, models, repair, &mut warnings)?;
     let materials = worn(&mut parts, materials);
     Ok(ObjFile { parts, materials, images, warnings, material_warnings })
 }
@@ -80,6 +81,7 @@ fn parts(
     file: &str,
     text: &str,
     models: Vec<tobj::Model>,
+    repair: bool,
     warnings: &mut Vec<String>,
 ) -> Result<Vec<Part>> {
     let mut raw: Vec<(RawMesh, Option<usize>)> = Vec::new();
@@ -102,8 +104,12 @@ fn parts(
     let mut lost = 0;
     for (mut part, material) in raw {
         part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
+        let mending = if repair { mend(&mut part) } else { Mending::default() };
         match Mesh::new(part) {
-            Ok(mesh) => parts.push(Part { mesh, material }),
+            Ok(mesh) => {
+                warnings.extend(mending.told(&mesh));
+                parts.push(Part { mesh, material });
+            }
             Err(Refusal::NoTriangles { degenerate }) => lost += degenerate,
             Err(refusal) => {
                 let (line, message) = bad_number(text).unwrap_or_else(|| (0, refusal.to_string()));
