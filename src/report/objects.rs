@@ -92,24 +92,16 @@ fn said(finding: &Finding) -> String {
         format!("{}, {first}at {}{advice}", counted(finding.count, what), point(finding.place))
     };
     match finding.ailment {
-        Ailment::OpenEdges => at("open edge", "; --repair closes cracks, a sheet wants thin_walled = true"),
+        Ailment::OpenEdges => at("open edge", "; --repair, or thin_walled = true for a sheet"),
         Ailment::NonManifoldEdges => at("non-manifold edge", ""),
-        Ailment::InconsistentEdges => {
-            at("inconsistent edge", "; their triangles look to different sides, --repair turns them")
-        }
+        Ailment::InconsistentEdges => at("inconsistent edge", "; --repair turns triangles to agree"),
         Ailment::InvertedShells => at("inverted shell", "; turned"),
-        Ailment::SelfIntersections => {
-            at("self-intersection", "; unite what crosses, or give each body an object of its own")
-        }
+        Ailment::SelfIntersections => at("self-intersection", "; unite what crosses, or part it"),
         Ailment::DuplicateFaces => at("duplicate face", "; --repair removes them"),
-        Ailment::NestedShells => {
-            at("nested shell", "; to be a hollow it has to look inwards, to be a body it wants an object of its own")
-        }
+        Ailment::NestedShells => at("nested shell", "; a hollow looks inwards, a body wants an object of its own"),
         Ailment::ThinWalls => at(
-            "triangle",
-            &format!(
-                " with a wall of {size} m or more behind; rays step over it: thicken it, or set thin_walled = true"
-            ),
+            "thin wall",
+            &format!(", {size} m at the thinnest; rays step over it: thicken it, or thin_walled = true"),
         ),
         Ailment::TooLarge => format!("{size} m large; lengths are metres: from millimetres, set scale = 0.001"),
         Ailment::TooSmall => format!("{size} m large; lengths are metres: from kilometres, set scale = 1000"),
@@ -126,11 +118,8 @@ impl fmt::Display for ObjectRow {
         };
         let told = self.findings.iter().map(|finding| finding.says.clone());
         let rest = self.unfinished.iter().map(|ailment| format!("not all looked at for {}, too many", name(ailment)));
-        for (i, line) in told.chain(rest).enumerate() {
-            let end = if i == 0 { "" } else { "\n" };
-            write!(f, "{end}  object {}, {}: {line}", self.object, self.mesh)?;
-        }
-        Ok(())
+        write!(f, "  object {}, {}", self.object, self.mesh)?;
+        told.chain(rest).try_for_each(|line| write!(f, "\n    {line}"))
     }
 }
 
@@ -237,13 +226,11 @@ mod tests {
         let says = |ailment, count, size| said(&Finding { ailment, count, place, triangle: None, size });
         assert_eq!(
             says(Ailment::OpenEdges, 12, None),
-            "12 open edges, the first at (0.1, 0, -2); --repair closes cracks, a sheet wants thin_walled = true"
+            "12 open edges, the first at (0.1, 0, -2); --repair, or thin_walled = true for a sheet"
         );
         assert_eq!(says(Ailment::InvertedShells, 1, None), "1 inverted shell, at (0.1, 0, -2); turned");
-        assert!(
-            says(Ailment::ThinWalls, 2, Some(1.5e-6))
-                .contains("2 triangles, the first at (0.1, 0, -2) with a wall of 1.5e-6 m")
-        );
+        let thin = "2 thin walls, the first at (0.1, 0, -2), 1.5e-6 m at the thinnest; rays step over it";
+        assert!(says(Ailment::ThinWalls, 2, Some(1.5e-6)).starts_with(thin));
         assert!(says(Ailment::TooLarge, 1, Some(150.0)).starts_with("150 m large; lengths are metres"));
     }
 

@@ -100,7 +100,7 @@ impl Scene {
             if of_mesh.as_ref().is_none_or(|findings| body.is_some() && !findings.of_a_body) {
                 *of_mesh = Some(MeshFindings::new(mesh, body.is_some()));
             }
-            let of_mesh = of_mesh.as_ref().cloned().unwrap_or_default();
+            let of_mesh = of_mesh.get_or_insert_default();
             let in_world =
                 |finding: Finding| Finding { place: object.transform.transform_point3(finding.place), ..finding };
             let mut diagnosis = Diagnosis {
@@ -112,7 +112,7 @@ impl Scene {
             };
             diagnosis.findings.iter_mut().for_each(|finding| *finding = in_world(*finding));
             if let Some(glass) = body {
-                let thin = thin::walls(mesh, &object.transform, self.camera.position);
+                let thin = thin::walls(mesh, &object.transform, self.camera.position, &of_mesh.folded);
                 diagnosis.findings.extend(thin.finding);
                 diagnosis.unfinished.extend((!thin.is_complete).then_some(Ailment::ThinWalls));
                 diagnosis.findings.extend(self.scale(object, glass));
@@ -161,6 +161,8 @@ struct MeshFindings {
     shells: usize,
     cavities: usize,
     findings: Vec<Finding>,
+    /// Whether a triangle crosses another one or shares a vertex with one that does; empty where none does.
+    folded: Vec<bool>,
     unfinished: Vec<Ailment>,
 }
 
@@ -192,11 +194,20 @@ impl MeshFindings {
             let nested = shells.nested(&crossings.triangles);
             found.findings.extend(nested.finding);
             found.unfinished.extend((!nested.is_complete).then_some(Ailment::NestedShells));
+            found.folded = around(&crossings.triangles, &corners);
         } else {
             found.findings.extend(duplicates::faces(mesh, &corners));
         }
         found
     }
+}
+
+/// Of each triangle, by welded vertices, whether it shares one with those that are `some`; nothing where there are none.
+fn around(some: &[usize], corners: &[[u32; 3]]) -> Vec<bool> {
+    let mut vertices: Vec<_> = some.iter().flat_map(|&number| corners[number]).collect();
+    vertices.sort_unstable();
+    let is_among = |vertex: &u32| vertices.binary_search(vertex).is_ok();
+    if some.is_empty() { Vec::new() } else { corners.iter().map(|corners| corners.iter().any(is_among)).collect() }
 }
 
 /// What was found, of as much as was looked at.

@@ -136,10 +136,11 @@ fn triangles_that_cross_are_counted_and_placed() {
 
 #[test]
 fn rounded_corners_on_a_side_do_not_cross_it() {
-    // A foot on a plate, off by what six digits lose, and a fan whose hub lies on the edge of its neighbour.
+    // A foot on a plate, off by what six digits lose.
     for off in [-1e-6, 0.0, 1e-6_f32] {
         let foot = Shape::cuboid([-0.1, 0.5 + off, -0.1], [0.1, 0.7, 0.1]);
-        is_well(&alone(cube().and(foot)));
+        let found = alone(cube().and(foot)).diagnose().remove(0);
+        assert!(found.findings.iter().all(|finding| finding.ailment == Ailment::ThinWalls), "{off}: {found:#?}");
     }
 }
 
@@ -167,7 +168,7 @@ fn walls_that_rays_step_over_are_thin() {
     let finding = only(&alone(sheet(2e-6)));
     assert_eq!((finding.ailment, finding.count), (Ailment::ThinWalls, 4));
     assert!((finding.size.expect("a thickness") / 2e-6 - 1.0).abs() < 1e-3, "{finding:?}");
-    // From a kilometre away the arithmetic is coarser.
+    // From ten kilometres away the arithmetic is coarser.
     let mut far = alone(sheet(1e-4));
     far.camera.position.z = 1e4;
     assert_eq!(only(&far).ailment, Ailment::ThinWalls);
@@ -248,31 +249,41 @@ fn what_lies_in_what_is_told() {
 
 /// Everything that comes with the program, and what its pictures are made of.
 #[test]
-fn what_is_shipped_is_well() {
-    let mut looked_at = 0;
+fn what_is_shipped_is_well_but_for_what_is_known() {
+    use Ailment::{DuplicateFaces, NonManifoldEdges, SelfIntersections, TooLarge, TooSmall};
+    let (mut looked_at, mut ailing) = (0, Vec::new());
     for folder in
         ["assets/meshes", "assets/scenes", "assets/validation", "tests/regress/meshes", "tests/regress/scenes"]
     {
         for entry in std::fs::read_dir(Path::new(env!("CARGO_MANIFEST_DIR")).join(folder)).expect("a folder") {
             let path = entry.expect("a file").path();
             let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+            // Those two are flat and worn by what is opaque.
             if !(name.ends_with(".obj") || name.ends_with(".toml")) || ["floor.obj", "lamp.obj"].contains(&&*name) {
                 continue;
             }
             let mut scene = Scene::load(Some(&path), &Overrides::default()).unwrap_or_else(|e| panic!("{name}: {e}"));
             scene.frame(4.0 / 3.0);
             for found in scene.diagnose() {
-                let ailments: Vec<_> = found.findings.iter().map(|finding| finding.ailment).collect();
-                let wanted = match name.as_str() {
-                    "tiny.toml" => vec![Ailment::TooSmall],
-                    "huge.toml" => vec![Ailment::TooLarge],
-                    _ => vec![],
-                };
-                assert_eq!(ailments, wanted, "{name}: {found:#?}");
                 assert_eq!(found.unfinished, [], "{name}");
+                let ailments: Vec<_> = found.findings.iter().map(|finding| finding.ailment).collect();
+                if !ailments.is_empty() {
+                    ailing.push((name.clone(), found.object, ailments));
+                }
             }
             looked_at += 1;
         }
     }
+    ailing.sort();
+    // Where the teapot's handle meets its inside, the surface folds through itself by a tenth of a millimetre.
+    let fold = |name: &str| (name.to_owned(), 0, vec![SelfIntersections]);
+    let mut wanted: Vec<_> =
+        ["figure3-a.toml", "figure3-c.toml", "figure3-d.toml", "teapot.toml", "teapot_body.obj"].map(fold).to_vec();
+    // Two cubes that share a face.
+    wanted.extend(["cubes.obj", "cubes.toml"].map(|name| (name.into(), 0, vec![NonManifoldEdges, DuplicateFaces])));
+    wanted.push(("huge.toml".into(), 0, vec![TooLarge]));
+    wanted.push(("tiny.toml".into(), 0, vec![TooSmall]));
+    wanted.sort();
+    assert_eq!(ailing, wanted);
     assert!(looked_at > 30, "{looked_at}");
 }

@@ -27,31 +27,33 @@ const OPPOSED: f64 = -0.99;
 /// Pairs of triangles that are looked at: some seconds.
 const MOST_TESTS: usize = 100_000_000;
 
-/// Triangles of `mesh`, put in its place by `transform` and seen from `camera`, whose opposite wall is too near.
-pub fn walls(mesh: &Mesh, transform: &DAffine3, camera: DVec3) -> Examined {
+/// Triangles of `mesh`, put in its place by `transform` and seen from `camera`, whose opposite wall is too near; those that
+/// are `folded` into others have another fault.
+pub fn walls(mesh: &Mesh, transform: &DAffine3, camera: DVec3, folded: &[bool]) -> Examined {
     let walls = Walls::new(mesh, transform);
     let rounding = Rounding::new(transform, camera);
     let mirrored = if transform.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
+    let is_folded = |number: usize| folded.get(number) == Some(&true);
     let parts = parts(mesh.triangles.len());
     let budget = MOST_TESTS / parts.len().max(1);
     let found = parallel::map(parallel::threads(), parts, |part| {
         let (mut thin, mut left) = (Vec::new(), budget);
-        for number in part {
+        for number in part.filter(|number| !is_folded(*number)) {
             let corners = &walls.triangles[number];
             let (outward, center) = (mirrored * normal(corners), middle(corners));
             let local =
                 mesh.triangles[number].map(|vertex| DVec3::from_array(mesh.positions[vertex as usize].map(f64::from)));
-            let step = rounding.step(&local, outward);
-            let reach = FEW * step;
+            let reach = FEW * rounding.step(&local, outward);
+            let touching = rounding.of_vertices(&local);
             let mut thinnest = f64::INFINITY;
             walls.near(Bounds { min: center - reach, max: center + reach }, 0.0, |other| {
                 left = left.saturating_sub(1);
                 let wall = &walls.triangles[other];
                 let facing = mirrored * normal(wall);
-                if other != number && outward.dot(facing) < OPPOSED {
+                if other != number && !is_folded(other) && outward.dot(facing) < OPPOSED {
                     let thickness = facing.dot(center - wall[0]) / facing.dot(outward);
-                    // What is nearer than a rounding touches: that is told elsewhere.
-                    if (step / 16.0..reach).contains(&thickness) && lies_on(center, wall, reach) {
+                    // What is nearer than vertices are rounded touches: that is told elsewhere.
+                    if (touching..reach).contains(&thickness) && lies_on(center, wall, reach) {
                         thinnest = thinnest.min(thickness);
                     }
                 }
@@ -88,6 +90,11 @@ impl Rounding {
         let [stretch, shrink] = [to_world, to_object]
             .map(|m| DMat3::from_cols(m.matrix3.x_axis.abs(), m.matrix3.y_axis.abs(), m.matrix3.z_axis.abs()));
         Self { to_world, stretch, shrink, back: to_object.translation.abs() }
+    }
+
+    /// How far off the corners of a triangle may be because they are 32-bit numbers.
+    fn of_vertices(&self, corners: &[DVec3; 3]) -> f64 {
+        (self.stretch * middle(&corners.map(DVec3::abs))).max_element() * f64::from(f32::EPSILON)
     }
 
     /// How far beyond the middle of a triangle of the mesh's space rays start that leave it.
