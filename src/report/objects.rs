@@ -200,7 +200,7 @@ fn point(place: DVec3) -> String {
 fn figure(x: f64) -> String {
     let rounded = format!("{x:.3e}");
     match rounded.parse::<f64>() {
-        Ok(x) if x == 0.0 => "0".into(),
+        Ok(0.0) => "0".into(),
         Ok(x) if (1e-4..1e6).contains(&x.abs()) => x.to_string(),
         Ok(x) => format!("{x:e}"),
         Err(_) => rounded,

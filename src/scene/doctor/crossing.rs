@@ -13,7 +13,7 @@ use super::{Ailment, Finding, parts};
 use crate::parallel;
 
 /// Pairs of triangles whose boxes meet that are looked at: some seconds.
-const MOST_TESTS: usize = 200_000_000;
+const MOST_TESTS: usize = 100_000_000;
 
 /// The triangles of a mesh that cross others of it.
 pub struct Crossings {
