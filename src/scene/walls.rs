@@ -27,7 +27,8 @@ impl Walls {
         Self { triangles, bvh: build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default()) }
     }
 
-    /// Calls `visit` with triangles until it returns false: all that come as close to `bounds` as `room`, and some others.
+    /// Calls `visit` with triangles until it returns false: all that come as close to `bounds` as `room`, and some
+    /// others.
     pub fn near(&self, bounds: Bounds, room: f64, mut visit: impl FnMut(usize) -> bool) {
         self.bvh.aabb_traverse(wide(bounds, room), |bvh, node| {
             let node = &bvh.nodes[node as usize];

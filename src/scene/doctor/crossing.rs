@@ -1,8 +1,8 @@
 //! Triangles that cross. In flow walls, out flow the pairs of them that pass through each other.
 //!
-//! Two triangles cross where each has corners on both sides of the plane of the other, and they share a piece of the line
-//! in which the planes meet. Corners nearer to a plane than the tolerance are in it, and pieces shorter than that are
-//! none: what touches, neighbours, and what lies in one plane does not cross.
+//! Two triangles cross where each has corners on both sides of the plane of the other, and they share a piece of the
+//! line in which the planes meet. Corners nearer to a plane than the tolerance are in it, and pieces shorter than that
+//! are none: what touches, neighbours, and what lies in one plane does not cross.
 
 use glam::DVec3;
 
@@ -122,8 +122,8 @@ fn normal_beyond(corners: &[DVec3; 3], tolerance: f64) -> Option<DVec3> {
     (twice_area.length() > tolerance * longest).then(|| twice_area.normalize())
 }
 
-/// Where a triangle passes through a plane that its corners have these distances from: the two ends, the lower one along
-/// `line` first.
+/// Where a triangle passes through a plane that its corners have these distances from: the two ends, the lower one
+/// along `line` first.
 fn cut(corners: &[DVec3; 3], distances: &[f64; 3], line: DVec3) -> [(f64, DVec3); 2] {
     let mut ends = [(f64::INFINITY, middle(corners)), (f64::NEG_INFINITY, middle(corners))];
     for (i, j) in [(0, 1), (1, 2), (2, 0)] {

@@ -1,4 +1,5 @@
-//! Faces that are there twice. In flow triangles, out flow those with the corners of another one, whichever side they show.
+//! Faces that are there twice. In flow triangles, out flow those with the corners of another one, whichever side they
+//! show.
 
 use super::super::Mesh;
 use super::super::topology::place;

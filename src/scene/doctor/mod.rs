@@ -1,5 +1,5 @@
-//! What is wrong with each object as a body of glass, and where. In flows a scene, out flow a [`Diagnosis`] of every object
-//! and, from [`Scene::nests`], which dielectric lies inside of which.
+//! What is wrong with each object as a body of glass, and where. In flows a scene, out flow a [`Diagnosis`] of every
+//! object and, from [`Scene::nests`], which dielectric lies inside of which.
 //!
 //! Everything is 64-bit arithmetic on the CPU and bounded: what would take too long is left and told as unfinished.
 
@@ -23,8 +23,8 @@ use super::walls::Walls;
 use super::{Dielectric, FaultSites, Mesh, MeshFaults, Object, Scene, Surface};
 use shells::Shells;
 
-/// Bodies of glass beyond these sizes in metres are told: lengths are metres, and files in millimetres or kilometres are not
-/// rare. A facade of glass is smaller than the one, and a bead larger than the other.
+/// Bodies of glass beyond these sizes in metres are told: lengths are metres, and files in millimetres or kilometres
+/// are not rare. A facade of glass is smaller than the one, and a bead larger than the other.
 const LARGE: f64 = 100.0;
 const SMALL: f64 = 1e-4;
 
@@ -202,7 +202,8 @@ impl MeshFindings {
     }
 }
 
-/// Of each triangle, by welded vertices, whether it shares one with those that are `some`; nothing where there are none.
+/// Of each triangle, by welded vertices, whether it shares one with those that are `some`; nothing where there are
+/// none.
 fn around(some: &[usize], corners: &[[u32; 3]]) -> Vec<bool> {
     let mut vertices: Vec<_> = some.iter().flat_map(|&number| corners[number]).collect();
     vertices.sort_unstable();

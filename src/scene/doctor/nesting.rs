@@ -1,8 +1,8 @@
-//! Which dielectric lies inside of which. In flow the bodies of glass of a scene, out flow the pairs of them that have to do
-//! with each other.
+//! Which dielectric lies inside of which. In flow the bodies of glass of a scene, out flow the pairs of them that have
+//! to do with each other.
 //!
-//! Bodies whose surfaces cross overlap. Of the others each shell is on one side of the other body, all of it: one point that
-//! does not lie on both surfaces tells which, by its winding number.
+//! Bodies whose surfaces cross overlap. Of the others each shell is on one side of the other body, all of it: one point
+//! that does not lie on both surfaces tells which, by its winding number.
 
 use std::ops::ControlFlow;
 

@@ -1,5 +1,5 @@
-//! Mends a mesh that a file holds. In flow its vertices and triangles, out flow the same with cracks closed, duplicate faces
-//! dropped and neighbours that agree on where the outside is; [`Mending`] says what was done.
+//! Mends a mesh that a file holds. In flow its vertices and triangles, out flow the same with cracks closed, duplicate
+//! faces dropped and neighbours that agree on where the outside is; [`Mending`] says what was done.
 //!
 //! No vertex is taken away: those that are welded are moved to one place, each with its normal and texture coordinates.
 //! Shells that are inside out as a whole are left to [`super::super::Mesh::new`], which turns them anyway.
@@ -117,8 +117,8 @@ fn close_cracks(positions: &mut [[f32; 3]]) -> usize {
     welded
 }
 
-/// Removes triangles that are there twice. Of two that look to opposite sides both stay, a wall between two bodies, unless
-/// most of the mesh is doubled like that: then it was exported with two sides, and one is enough.
+/// Removes triangles that are there twice. Of two that look to opposite sides both stay, a wall between two bodies,
+/// unless most of the mesh is doubled like that: then it was exported with two sides, and one is enough.
 fn drop_duplicates(raw: &mut RawMesh, corners: &[[u32; 3]]) -> usize {
     let is_folded = |[a, b, c]: [u32; 3]| a == b || b == c || c == a;
     let groups: Vec<_> = twins(corners).into_iter().filter(|group| !is_folded(corners[group[0]])).collect();
@@ -151,8 +151,8 @@ fn drop_duplicates(raw: &mut RawMesh, corners: &[[u32; 3]]) -> usize {
     before - raw.triangles.len()
 }
 
-/// Turns the fewer triangles of each connected patch over, so that all of it looks to one side; leaves a patch, a Möbius
-/// strip, where that cannot be. Edges of more than two triangles bound patches.
+/// Turns the fewer triangles of each connected patch over, so that all of it looks to one side; leaves a patch, a
+/// Möbius strip, where that cannot be. Edges of more than two triangles bound patches.
 fn turn(raw: &mut RawMesh, corners: &[[u32; 3]]) -> usize {
     let mut edges = Vec::with_capacity(corners.len() * 3);
     for (number, [a, b, c]) in (0_u32..).zip(corners) {

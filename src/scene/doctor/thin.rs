@@ -1,9 +1,9 @@
-//! Walls that rays step over. In flow a mesh, its place and the camera, out flow the triangles whose opposite wall is nearer
-//! than the renderer's arithmetic can tell.
+//! Walls that rays step over. In flow a mesh, its place and the camera, out flow the triangles whose opposite wall is
+//! nearer than the renderer's arithmetic can tell.
 //!
-//! A ray that leaves a surface starts beyond the rounding error of the point it left from (`shaders/offset.glsl`), so that it
-//! may start behind a wall that is nearer. That error grows with the coordinates in the mesh's space and with the distance
-//! from the camera, which is where the renderer has its origin.
+//! A ray that leaves a surface starts beyond the rounding error of the point it left from (`shaders/offset.glsl`), so
+//! that it may start behind a wall that is nearer. That error grows with the coordinates in the mesh's space and with
+//! the distance from the camera, which is where the renderer has its origin.
 
 use glam::{DAffine3, DMat3, DVec3};
 
@@ -14,21 +14,23 @@ use crate::optics::offset::offset_distance;
 use crate::parallel;
 use crate::scene::Bounds;
 
-/// Bounds of relative errors after 5 and 7 roundings to 32 bits, as in `shaders/arrival.glsl`: n u / (1 - n u), u = 2^-24.
+/// Bounds of relative errors after 5 and 7 roundings to 32 bits, as in `shaders/arrival.glsl`: n u / (1 - n u), u =
+/// 2^-24.
 const GAMMA_5: f64 = 5.0 / 16_777_211.0;
 const GAMMA_7: f64 = 7.0 / 16_777_209.0;
 
 /// A wall is thin below so many steps from a surface: its far side is rounded as well, and slanted rays need more.
 const FEW: f64 = 4.0;
 
-/// The cosine from which two walls that look away from each other are parallel: an edge of 8 degrees is a wedge, not a wall.
+/// The cosine from which two walls that look away from each other are parallel: an edge of 8 degrees is a wedge, not a
+/// wall.
 const OPPOSED: f64 = -0.99;
 
 /// Pairs of triangles that are looked at: some seconds.
 const MOST_TESTS: usize = 100_000_000;
 
-/// Triangles of `mesh`, put in its place by `transform` and seen from `camera`, whose opposite wall is too near; those that
-/// are `folded` into others have another fault.
+/// Triangles of `mesh`, put in its place by `transform` and seen from `camera`, whose opposite wall is too near; those
+/// that are `folded` into others have another fault.
 pub fn walls(mesh: &Mesh, transform: &DAffine3, camera: DVec3, folded: &[bool]) -> Examined {
     let walls = Walls::new(mesh, transform);
     let rounding = Rounding::new(transform, camera);
