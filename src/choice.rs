@@ -46,7 +46,10 @@ const RUNGS: [(Option<f64>, u32); 4] =
 const EDGES: f64 = 0.65;
 
 /// How many times the samples of a pilot errors may be thought to fall with that power. Beyond, they fall with the square root.
-const REACH: f64 = 16.0;
+const REACH: f64 = 4.0;
+
+/// How many times the samples of a pilot a tolerance may take; beyond, another pilot is worth its time.
+const NEAR: f64 = 16.0;
 
 /// How much larger than the pilots say the error of samples may be: they are few pixels. `path` looks for itself, and is held to a
 /// little more than the tolerance says.
@@ -532,7 +535,7 @@ impl<'a> Pilots<'a> {
             let is_near = spread.samples > FEW
                 && tolerance.is_none_or(|tolerance| {
                     let needed = spread.law(0.0, MARGIN, 0.0, 0).samples(tolerance);
-                    needed.is_none_or(|needed| f64::from(needed) <= REACH * f64::from(spread.samples))
+                    needed.is_none_or(|needed| f64::from(needed) <= NEAR * f64::from(spread.samples))
                 });
             if is_near || spread.error <= 0.0 || !self.fits(time * STEP) {
                 return Ok(spread);

@@ -1,8 +1,15 @@
-//! Hostile files: whatever the scene, OBJ, MTL and image readers are given, they answer with a value or an error, in
+//! Hostile files: whatever the scene, OBJ, MTL, glTF and image readers are given, they answer with a value or an error, in
 //! little time and memory, and never panic.
 //!
 //! Cases are valid seeds, mutated. Short by default; `VITRUM_FUZZ_SECONDS` sets the length of each test. A failure
 //! leaves the case in a file and prints its name.
+
+#[allow(dead_code, reason = "each test program uses its share")]
+#[path = "common/gltf.rs"]
+mod gltf;
+#[allow(dead_code, reason = "each test program uses its share")]
+#[path = "tree/shapes.rs"]
+mod shapes;
 
 use std::fs;
 use std::io::Cursor;
@@ -10,7 +17,8 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use vitrum::scene::{Overrides, Scene, Surface, Texels, Texture};
+use serde_json::{Value, json};
+use vitrum::scene::{Mesh, Overrides, Scene, Surface, Texels, Texture};
 
 /// The longest that one case may take.
 const SLOWEST: Duration = Duration::from_secs(2);
@@ -59,7 +67,7 @@ fn mutated(random: &mut Random, seed: &[u8], others: &[Vec<u8>]) -> Vec<u8> {
             0 if !bytes.is_empty() => bytes[at] ^= 1 << random.below(8),
             1 if !bytes.is_empty() => bytes[at] = random.next() as u8,
             2 => bytes.truncate(at),
-            3 => {
+            3 if !others.is_empty() => {
                 let other = random.pick(others).clone();
                 let (from, to) = (random.range(&other), random.range(&bytes));
                 bytes.splice(to, other[from].iter().copied());
@@ -236,16 +244,20 @@ impl Folder {
 
     /// Whether the scene can be read; what it holds must be sound.
     fn load(&self) -> bool {
-        match Scene::load(Some(&self.scene), &Overrides::default()) {
-            Ok(scene) => {
-                check(&scene);
-                true
-            }
-            Err(error) => {
-                assert_eq!(error.exit_code(), 2);
-                assert!(!error.to_string().contains('\n'), "{error}");
-                false
-            }
+        loads(&self.scene)
+    }
+}
+
+fn loads(scene: &Path) -> bool {
+    match Scene::load(Some(scene), &Overrides::default()) {
+        Ok(scene) => {
+            check(&scene);
+            true
+        }
+        Err(error) => {
+            assert_eq!(error.exit_code(), 2);
+            assert!(!error.to_string().contains('\n'), "{error}");
+            false
         }
     }
 }
@@ -296,6 +308,129 @@ fn obj_files() {
             folder.load()
         },
     );
+}
+
+/// A model with something of everything that is read.
+fn model() -> gltf::Model {
+    let mut model = gltf::Model::new();
+    let mut png = Cursor::new(Vec::new());
+    image::RgbImage::from_pixel(2, 1, image::Rgb([255, 0, 188])).write_to(&mut png, image::ImageFormat::Png).unwrap();
+    let view = model.view(&png.into_inner());
+    model.push("images", json!({ "bufferView": view, "mimeType": "image/png" }));
+    model.push("textures", json!({ "source": 0 }));
+    let transform = json!({ "offset": [0.5, 0.5], "rotation": 0.5, "scale": [2, 2] });
+    model.push(
+        "materials",
+        json!({ "name": "wood", "emissiveFactor": [1, 1, 1], "pbrMetallicRoughness": {
+        "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0, "roughnessFactor": 0.5, "baseColorTexture": {
+            "index": 0, "extensions": { "KHR_texture_transform": transform } } } }),
+    );
+    model.push(
+        "materials",
+        json!({ "name": "glass", "pbrMetallicRoughness": { "metallicFactor": 0 }, "extensions": {
+        "KHR_materials_transmission": { "transmissionFactor": 1 }, "KHR_materials_ior": { "ior": 1.5 },
+        "KHR_materials_volume": { "thicknessFactor": 1, "attenuationColor": [1, 0.5, 0.5], "attenuationDistance": 1 },
+        "KHR_materials_dispersion": { "dispersion": 0.5 } } }),
+    );
+    let quad = shapes::rectangle(2.0, 2.0);
+    let quad = Mesh { uvs: vec![[0.0, 1.0]; quad.positions.len()], ..quad };
+    let primitives = [model.primitive(&quad, Some(0)), model.primitive(&shapes::icosphere(0), Some(1))];
+    let mesh = model.mesh(&primitives);
+    let places = model.view(&[0, 1]);
+    let values = model.view(&[0; 24]);
+    let sparse = json!({ "componentType": gltf::F32, "type": "VEC3", "count": 4, "min": [0, 0, 0], "max": [1, 1, 1],
+        "sparse": { "count": 2, "indices": { "bufferView": places, "componentType": gltf::U8 },
+            "values": { "bufferView": values } } });
+    let positions = model.push("accessors", sparse);
+    let strip = model.mesh(&[json!({ "attributes": { "POSITION": positions }, "mode": 5 })]);
+    model.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.6, "znear": 0.1 } }));
+    model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 8 }] } });
+    let inner =
+        model.push("nodes", json!({ "mesh": mesh, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] }));
+    model.node(json!({ "children": [inner], "translation": [1, 0, 0], "rotation": [0, 0, 0, 1], "scale": [1, 2, 1] }));
+    model.node(json!({ "camera": 0, "translation": [0, 0, 5] }));
+    model.node(json!({ "mesh": strip, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    model
+}
+
+/// Puts hostile values in the place of some, and leaves it well formed.
+fn mutate_json(random: &mut Random, value: &mut Value) {
+    let count = match value {
+        Value::Object(members) => members.len(),
+        Value::Array(list) => list.len(),
+        _ => 0,
+    };
+    let place = random.below(count);
+    let inner = match value {
+        Value::Object(members) => members.values_mut().nth(place),
+        Value::Array(list) => list.get_mut(place),
+        _ => None,
+    };
+    match inner {
+        Some(inner) if !random.one_in(12) => mutate_json(random, inner),
+        _ => match (random.below(4), &mut *value) {
+            (0, Value::Array(list)) if !list.is_empty() => list.push(list[place].clone()),
+            (1, Value::Array(list)) => drop(list.pop()),
+            (2, Value::Object(members)) => {
+                let key = members.keys().nth(place).cloned();
+                drop(key.and_then(|key| members.remove(&key)));
+            }
+            _ => {
+                let hostile = [
+                    json!(0),
+                    json!(1),
+                    json!(2),
+                    json!(3),
+                    json!(5),
+                    json!(-1),
+                    json!(0.5),
+                    json!(1e-40),
+                    json!(1e39),
+                    json!(-1e30),
+                    json!(u32::MAX),
+                    json!(u64::MAX),
+                    json!(5121),
+                    json!(5123),
+                    json!(""),
+                    json!("VEC2"),
+                    json!("data:,"),
+                    json!([]),
+                    json!({}),
+                    json!(null),
+                ];
+                *value = random.pick(&hostile).clone();
+            }
+        },
+    }
+}
+
+#[test]
+fn gltf_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let scene = folder.path().join("fuzz.gltf");
+    // One value a line, for what swaps lines and words.
+    let text: serde_json::Value = serde_json::from_str(&model().embedded()).unwrap();
+    let text = serde_json::to_string_pretty(&text).unwrap().replace(": ", " : ").into_bytes();
+    let binary = model().glb();
+    let seeds = [text, binary];
+    let make = |random: &mut Random| match random.below(4) {
+        0 => mutated_text(random, &seeds[0], &seeds[..1]),
+        1 => mutated(random, &seeds[1], &seeds),
+        _ => {
+            let mut changed = model();
+            for _ in 0..1 + random.below(3) {
+                mutate_json(random, &mut changed.json);
+            }
+            if random.one_in(4) {
+                changed.buffer = mutated(random, &changed.buffer, &[]);
+            }
+            changed.glb()
+        }
+    };
+    fuzz("gltf", make, |bytes| {
+        fs::write(&scene, bytes).unwrap();
+        loads(&scene)
+    });
 }
 
 #[test]

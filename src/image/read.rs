@@ -49,7 +49,7 @@ impl Stored {
             Self::Linear(image) => image,
             Self::Srgb { width, height, pixels } => {
                 // Up to 8 bits a table is exact and fast.
-                let table: Vec<f32> = (0..=255u8).map(|code| from_srgb(f64::from(code) / 255.0)).collect();
+                let table: Vec<f32> = (0..=255u8).map(decode_srgb).collect();
                 let pixels = pixels.into_iter().map(|pixel| pixel.map(|code| table[usize::from(code)])).collect();
                 FloatImage { width, height, pixels, layers: Vec::new() }
             }
@@ -145,6 +145,11 @@ fn decode_other(format: Format, bytes: &[u8]) -> Result<Stored, Unreadable> {
         }
     };
     Ok(Stored::Linear(FloatImage { width, height, pixels, layers: Vec::new() }))
+}
+
+/// From 8 bits as sRGB to linear.
+pub fn decode_srgb(code: u8) -> f32 {
+    from_srgb(f64::from(code) / 255.0)
 }
 
 /// IEC 61966-2-1, display value to linear.

@@ -155,7 +155,7 @@ pub(super) fn texels(textures: &[Arc<Texture>]) -> Vec<u32> {
         let header = [words.len() as u32, width, height];
         words[3 * number..][..3].copy_from_slice(&header);
         let mut texels: Vec<[f32; 3]> = match &texture.texels {
-            Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| [r, g, b].map(decode_srgb)).collect(),
+            Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| [r, g, b].map(image::decode_srgb)).collect(),
             Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| [r, g, b].map(f16::to_f32)).collect(),
         };
         words.extend(texels.iter().copied().flat_map(pack_texel));
@@ -171,7 +171,7 @@ pub(super) fn texels(textures: &[Arc<Texture>]) -> Vec<u32> {
 fn mean(texture: &Texture) -> DVec3 {
     let wide = |texel: [f32; 3]| DVec3::from_array(texel.map(f64::from));
     let sum: DVec3 = match &texture.texels {
-        Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| wide([r, g, b].map(decode_srgb))).sum(),
+        Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| wide([r, g, b].map(image::decode_srgb))).sum(),
         Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| wide([r, g, b].map(f16::to_f32))).sum(),
     };
     sum / f64::from(texture.width) / f64::from(texture.height)
@@ -180,13 +180,6 @@ fn mean(texture: &Texture) -> DVec3 {
 fn pack_texel(texel: [f32; 3]) -> [u32; 2] {
     let [r, g, b] = texel.map(|value| u32::from(f16::from_f32(value).to_bits()));
     [r | g << 16, b]
-}
-
-/// From 8 bits as sRGB to linear: IEC 61966-2-1.
-fn decode_srgb(encoded: u8) -> f32 {
-    let encoded = f64::from(encoded) / 255.0;
-    let linear = if encoded <= 0.040_45 { encoded / 12.92 } else { ((encoded + 0.055) / 1.055).powf(2.4) };
-    linear as f32
 }
 
 /// Whether light is spread by a surface of that material.

@@ -9,7 +9,8 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::DAffine3;
 
 use super::files::Files;
-use super::obj::{self, ObjFile};
+use super::mesh::FARTHEST;
+use super::mesh_file::{Image, MeshFile};
 use super::texture::Textures;
 use super::{Bounds, Material, Mesh, Object, Surface};
 use crate::Result;
@@ -24,19 +25,17 @@ pub struct Assembly {
     pub warnings: Vec<String>,
     /// Meshes are mended beyond what [`Mesh::new`] does.
     repair: bool,
-    read: HashMap<PathBuf, MeshFile>,
+    read: HashMap<PathBuf, Loaded>,
     clear_glass: Option<usize>,
 }
 
 /// A file that was read.
 #[derive(Debug)]
-struct MeshFile {
-    /// Index of the mesh and, within the file, of its material.
-    parts: Vec<(usize, Option<usize>)>,
-    /// With indices into `images`, until they are worn.
-    materials: Vec<Material>,
-    images: Vec<PathBuf>,
-    warnings: Vec<String>,
+struct Loaded {
+    /// What it holds, but for the meshes.
+    file: MeshFile,
+    /// Where its meshes went.
+    first_mesh: usize,
     /// Where the materials went, once something wears them.
     first_material: Option<usize>,
 }
@@ -44,7 +43,8 @@ struct MeshFile {
 /// Where an object stands.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
-    pub number: usize,
+    /// The number of the object; `None`: each object of the file counts as one.
+    pub number: Option<usize>,
     pub transform: DAffine3,
     pub smooth: bool,
 }
@@ -80,7 +80,7 @@ impl Assembly {
         let work = || {
             let next = || distinct.get(next.fetch_add(1, Ordering::Relaxed));
             std::iter::from_fn(next)
-                .map(|(identity, path)| (identity, obj::read(files, path, repair)))
+                .map(|(identity, path)| (identity, MeshFile::read(files, path, repair)))
                 .collect::<Vec<_>>()
         };
         let workers = std::thread::available_parallelism().map_or(1, usize::from).min(distinct.len());
@@ -97,30 +97,25 @@ impl Assembly {
         Ok(())
     }
 
-    fn keep(&mut self, identity: PathBuf, file: ObjFile) {
-        let ObjFile { parts, materials, images, mut warnings, material_warnings } = file;
-        self.warnings.append(&mut warnings);
-        let mut indices = Vec::with_capacity(parts.len());
-        for part in parts {
-            indices.push((self.meshes.len(), part.material));
-            self.meshes.push(Arc::new(part.mesh));
-        }
-        let file = MeshFile { parts: indices, materials, images, warnings: material_warnings, first_material: None };
-        self.read.insert(identity, file);
+    fn keep(&mut self, identity: PathBuf, mut file: MeshFile) {
+        self.warnings.append(&mut file.warnings);
+        let first_mesh = self.meshes.len();
+        self.meshes.extend(std::mem::take(&mut file.meshes).into_iter().map(Arc::new));
+        self.read.insert(identity, Loaded { file, first_mesh, first_material: None });
     }
 
-    /// Adds the parts of the mesh file at `path` as one object.
-    pub fn add(&mut self, files: Files, path: &Path, wear: Wear, place: &Placement) -> Result<()> {
+    /// Adds what the mesh file at `path` holds. Out flows what else there is in it.
+    pub fn add(&mut self, files: Files, path: &Path, wear: Wear, place: &Placement) -> Result<Option<&mut MeshFile>> {
         let identity = files.identity(path);
         if !self.read.contains_key(&identity) {
-            let file = obj::read(files, path, self.repair)?;
+            let file = MeshFile::read(files, path, self.repair)?;
             self.keep(identity.clone(), file);
         }
-        let Some(file) = self.read.get_mut(&identity) else { return Ok(()) };
+        let Some(Loaded { file, first_mesh, first_material }) = self.read.get_mut(&identity) else { return Ok(None) };
         let own = matches!(wear, Wear::Own);
-        if own && file.first_material.is_none() {
-            file.first_material = Some(self.materials.len());
-            self.warnings.append(&mut file.warnings);
+        if own && first_material.is_none() {
+            *first_material = Some(self.materials.len());
+            self.warnings.append(&mut file.material_warnings);
             for mut material in file.materials.drain(..) {
                 open_image(files, &mut material, &file.images, &mut self.textures, &mut self.warnings);
                 self.materials.push(material);
@@ -130,9 +125,9 @@ impl Assembly {
             let count = file.materials.len();
             self.warnings.push(format!("{}: shown as clear glass, not with its {count} materials", path.display()));
         }
-        let first_material = file.first_material.unwrap_or(0);
-        for &(mesh, own) in &file.parts {
-            let material = match (wear, own) {
+        let first_material = first_material.unwrap_or(0);
+        for part in &file.parts {
+            let material = match (wear, part.material) {
                 (Wear::Material(material), _) => material,
                 (Wear::Own, Some(own)) => first_material + own,
                 (Wear::Own, None) | (Wear::ClearGlass, _) => *self.clear_glass.get_or_insert_with(|| {
@@ -140,15 +135,29 @@ impl Assembly {
                     self.materials.len() - 1
                 }),
             };
-            let Placement { number, transform, smooth } = *place;
-            self.objects.push(Object { mesh, material, number, transform, smooth });
+            self.objects.push(Object {
+                mesh: *first_mesh + part.mesh,
+                material,
+                number: place.number.unwrap_or(part.object),
+                transform: place.transform * part.transform,
+                smooth: place.smooth,
+            });
         }
-        Ok(())
+        Ok(Some(file))
+    }
+
+    /// Whether the objects from `first` on are where they can be rendered; the error says what to do.
+    pub fn check_reach(&self, first: usize) -> Result<(), String> {
+        let reach = self.objects[first..].iter().map(|object| self.bounds_of(object).reach()).fold(0.0, f64::max);
+        match reach <= FARTHEST {
+            true => Ok(()),
+            false => Err(format!("the object reaches {reach:.1e} m; at most 1e9 m can be rendered, scale it down")),
+        }
     }
 
     /// The files that were read so far.
     pub fn files(&self) -> Vec<PathBuf> {
-        self.read.keys().cloned().collect()
+        self.read.iter().flat_map(|(path, read)| std::iter::once(path).chain(&read.file.files)).cloned().collect()
     }
 
     /// The box around an object in the world.
@@ -167,25 +176,16 @@ impl Assembly {
 fn open_image(
     files: Files,
     material: &mut Material,
-    images: &[PathBuf],
+    images: &[Image],
     textures: &mut Textures,
     warnings: &mut Vec<String>,
 ) {
     let Surface::Opaque(opaque) = &mut material.surface else { return };
     let Some(image) = opaque.base_color_texture else { return };
     opaque.base_color_texture = textures
-        .open(files, &images[image], warnings)
+        .open_image(files, &images[image], warnings)
         .map_err(|error| {
             warnings.push(format!("{}; material {:?} has its colour instead", error.in_full(), material.name))
         })
         .ok();
-}
-
-/// Whether the extension at `path` is one of a mesh that is read; the error says what to do.
-pub fn check_mesh_kind(path: &Path) -> Result<(), String> {
-    match path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase()).as_deref() {
-        Some("obj") => Ok(()),
-        Some("glb" | "gltf") => Err("glTF is not read yet; convert to .obj".into()),
-        _ => Err("is no mesh of a known kind; known: .obj".into()),
-    }
 }

@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 
 use glam::{DAffine3, DMat3, DVec3};
 
-use super::assembly::{Assembly, Placement, Wear, check_mesh_kind};
+use super::assembly::{Assembly, Placement, Wear};
 use super::camera::DEFAULT_FOV;
 use super::files::Files;
 use super::material::Glass;
-use super::mesh::FARTHEST;
+use super::mesh_file;
 use super::render_table::options;
 use super::table::{
     Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT, text,
@@ -185,13 +185,13 @@ impl Reader<'_> {
         let mesh = table.require("mesh")?;
         let path = mesh.file(self.files, self.folder)?;
         let name = path.display().to_string();
-        check_mesh_kind(&path).map_err(|message| mesh.error(format!("mesh {name:?}: {message}")))?;
+        mesh_file::check_kind(&path).map_err(|message| mesh.error(format!("mesh {name:?}: {message}")))?;
         let wear = table.or("material", Wear::Own, |entry| material_number(entry, materials).map(Wear::Material))?;
         let translate = table.or("translate", DVec3::ZERO, |entry| entry.triple(&LENGTH))?;
         let degrees = table.or("rotate", DVec3::ZERO, |entry| entry.triple(&FINITE))?;
         let scale = table.or("scale", DVec3::ONE, |entry| entry.number_or_triple(&SCALE))?;
         let smooth = table.or("smooth", true, |entry| entry.boolean())?;
-        let place = Placement { number, transform: placed(scale, degrees, translate), smooth };
+        let place = Placement { number: Some(number), transform: placed(scale, degrees, translate), smooth };
         Ok(ObjectTable { table, mesh: path, wear, place })
     }
 }
@@ -208,12 +208,7 @@ impl ObjectTable<'_> {
     fn add_to(&self, files: Files, assembly: &mut Assembly) -> Result<()> {
         let first = assembly.objects.len();
         assembly.add(files, &self.mesh, self.wear, &self.place)?;
-        let reach =
-            assembly.objects[first..].iter().map(|object| assembly.bounds_of(object).reach()).fold(0.0, f64::max);
-        if reach <= FARTHEST {
-            return Ok(());
-        }
-        Err(self.table.error(format!("the object reaches {reach:.1e} m; at most 1e9 m can be rendered, scale it down")))
+        assembly.check_reach(first).map_err(|message| self.table.error(message))
     }
 }
 

@@ -10,6 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use serde::Serialize;
 
 use super::Bounds;
+use super::doctor::{Mending, mend};
 use super::topology::{self, Topology};
 
 /// The farthest a vertex, light or camera may lie from the origin. The renderer's 32-bit arithmetic squares areas:
@@ -35,6 +36,8 @@ pub struct Mesh {
     pub faults: MeshFaults,
     /// Where it was.
     pub sites: FaultSites,
+    /// What was mended before that.
+    pub mending: Mending,
     /// Whether it may hold bodies that overlap.
     pub overlaps: bool,
 }
@@ -208,7 +211,8 @@ impl Mesh {
         let mut used = vec![false; vertices];
         triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
         faults.unused_vertices = used.iter().filter(|used| !**used).count();
-        let mut mesh = Self { name, positions, normals, uvs, triangles, faults, sites, overlaps };
+        let mut mesh =
+            Self { name, positions, normals, uvs, triangles, faults, sites, mending: Mending::default(), overlaps };
         if mesh.normals.len() != vertices {
             mesh.normals.clear();
         }
@@ -219,6 +223,12 @@ impl Mesh {
         mesh.mend_normals(&used);
         mesh.mend_uvs(&used);
         Ok(mesh)
+    }
+
+    /// The same of what is mended first, if `repair` says so.
+    pub fn mended(mut raw: RawMesh, repair: bool) -> Result<Self, Refusal> {
+        let mending = if repair { mend(&mut raw) } else { Mending::default() };
+        Ok(Self { mending, ..Self::new(raw)? })
     }
 
     /// The box around the mesh in its own space.

@@ -13,8 +13,10 @@ mod doctor;
 mod environment;
 mod file;
 mod files;
+mod gltf;
 mod material;
 mod mesh;
+mod mesh_file;
 mod mtl;
 mod obj;
 mod obj_text;
@@ -34,7 +36,7 @@ use glam::{DAffine3, DVec3};
 
 pub use bounds::Bounds;
 pub use camera::Camera;
-pub use doctor::{Ailment, Diagnosis, Finding, Nest, Nesting};
+pub use doctor::{Ailment, Diagnosis, Finding, Mending, Nest, Nesting};
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
 pub(crate) use files::Files;
 pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
@@ -46,7 +48,7 @@ use crate::options::RenderArgs;
 use crate::{Error, Result};
 use assembly::{Assembly, Placement, Wear};
 use file::{EnvironmentTable, Light, SceneFile};
-use obj::shorten;
+use mesh_file::{MeshFile, shorten};
 
 /// Everything that a picture shows.
 #[derive(Clone, Debug)]
@@ -131,8 +133,14 @@ impl Scene {
         let mut scene = match extension.as_deref() {
             Some("toml") => Self::from_file(file::read(Files::Disk, path, overrides)?, name, overrides),
             Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path, overrides)?, name, overrides),
-            _ if path.is_dir() => Err(Error::input(path, 0, "is a folder; name a .toml (scene) or .obj (mesh) in it")),
-            _ => Err(Error::input(path, 0, "is no scene of a known kind; known: .toml (scene), .obj (mesh)")),
+            _ if path.is_dir() => {
+                Err(Error::input(path, 0, "is a folder; name a .toml (scene), .glb, .gltf or .obj (mesh) in it"))
+            }
+            _ => Err(Error::input(
+                path,
+                0,
+                "is no scene of a known kind; known: .toml (scene), .glb, .gltf, .obj (mesh)",
+            )),
         }?;
         scene.files.push(path.into());
         Ok(scene)
@@ -248,6 +256,9 @@ fn faults_of_meshes(objects: &[Object], meshes: &[Arc<Mesh>], materials: &[Mater
         warnings.push(format!("{}: {faults}{advice}", mesh.name));
     }
     shorten(&mut warnings, 0, "meshes have faults");
+    let before = warnings.len();
+    warnings.extend(meshes.iter().filter_map(|mesh| mesh.mending.told(mesh)));
+    shorten(&mut warnings, before, "meshes were repaired");
     warnings
 }
 
@@ -276,19 +287,24 @@ fn warn_of_missing_uvs(
     shorten(warnings, before, "meshes lack texture coordinates");
 }
 
-/// A mesh of clear glass in the default environment.
+/// A mesh file in the default environment: glTF as the scene that it is, anything else as clear glass.
 fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
-    assembly::check_mesh_kind(path).map_err(|message| Error::input(path, 0, message))?;
+    mesh_file::check_kind(path).map_err(|message| Error::input(path, 0, message))?;
     let mut assembly = Assembly::new(overrides.repair);
-    let place = Placement { number: 0, transform: DAffine3::IDENTITY, smooth: true };
-    assembly.add(Files::Disk, path, Wear::ClearGlass, &place)?;
-    Ok(SceneFile {
-        environment: EnvironmentTable::default(),
-        camera: None,
-        lights: Vec::new(),
-        render: RenderArgs::default(),
-        assembly,
-    })
+    let (wear, number) = match mesh_file::is_gltf(path) {
+        true => (Wear::Own, None),
+        false => (Wear::ClearGlass, Some(0)),
+    };
+    let place = Placement { number, transform: DAffine3::IDENTITY, smooth: true };
+    let (mut camera, mut lights, mut warnings) = (None, Vec::new(), Vec::new());
+    if let Some(file) = assembly.add(Files::Disk, path, wear, &place)? {
+        let MeshFile { camera: own, lights: all, scene_warnings, .. } = file;
+        (camera, lights, warnings) = (*own, std::mem::take(all), std::mem::take(scene_warnings));
+    }
+    assembly.warnings.append(&mut warnings);
+    assembly.check_reach(0).map_err(|message| Error::input(path, 0, message))?;
+    let (environment, render) = (EnvironmentTable::default(), RenderArgs::default());
+    Ok(SceneFile { environment, camera, lights, render, assembly })
 }
 
 impl Overrides {

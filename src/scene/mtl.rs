@@ -15,13 +15,13 @@
 //! because it gives up on them or panics.
 
 use std::collections::HashSet;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use glam::DVec3;
 
 use super::files::Files;
 use super::material::{Dielectric, Material, Opaque, Surface};
-use super::obj::shorten;
+use super::mesh_file::{Image, shorten};
 
 /// Metres over which `Tf` is taken to act.
 const FILTER_DISTANCE: f64 = 1.0;
@@ -32,7 +32,7 @@ pub fn read_all(
     files: Files,
     obj: &Path,
     libraries: &[String],
-    images: &mut Vec<PathBuf>,
+    images: &mut Vec<Image>,
     remarks: &mut Vec<String>,
 ) -> Vec<Material> {
     let folder = obj.parent().unwrap_or(Path::new(""));
@@ -56,7 +56,7 @@ pub fn read_all(
     materials
 }
 
-fn read(files: Files, path: &Path, images: &mut Vec<PathBuf>, remarks: &mut Vec<String>) -> Vec<Material> {
+fn read(files: Files, path: &Path, images: &mut Vec<Image>, remarks: &mut Vec<String>) -> Vec<Material> {
     let bytes = match files.read(path) {
         Ok(bytes) => bytes,
         Err(error) => {
@@ -143,7 +143,7 @@ fn image_name(mut rest: &str) -> Option<String> {
 struct Converter<'a> {
     files: Files,
     path: &'a Path,
-    images: &'a mut Vec<PathBuf>,
+    images: &'a mut Vec<Image>,
     remarks: &'a mut Vec<String>,
     material: &'a tobj::Material,
 }
@@ -210,7 +210,7 @@ impl Converter<'_> {
         let name = self.material.diffuse_texture.as_ref()?.replace('\\', "/");
         let path = self.path.parent().unwrap_or(Path::new("")).join(name);
         if self.files.exists(&path) {
-            self.images.push(path);
+            self.images.push(Image::file(path));
             return Some(self.images.len() - 1);
         }
         self.remark(&format!("map_Kd {:?} does not exist; the colour is used", path.display().to_string()));

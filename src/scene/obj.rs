@@ -5,42 +5,19 @@
 //! [`super::obj_text`] tidies the text, then `tobj` reads it.
 
 use std::collections::HashMap;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
-use super::doctor::{Mending, mend};
+use glam::DAffine3;
+
 use super::files::Files;
-use super::material::Material;
 use super::mesh::{Mesh, RawMesh, Refusal};
+use super::mesh_file::{MeshFile, Part, shorten, worn};
 use super::mtl;
 use super::obj_text::{Tidy, bad_number};
 use crate::{Error, Result};
 
-/// What an OBJ file holds.
-#[derive(Clone, Debug)]
-pub struct ObjFile {
-    /// Meshes with indices into [`ObjFile::materials`].
-    pub parts: Vec<Part>,
-    /// The materials of the MTL files that parts wear; their textures are indices into [`ObjFile::images`].
-    pub materials: Vec<Material>,
-    /// The images that they name, not opened yet.
-    pub images: Vec<PathBuf>,
-    /// What is wrong with the meshes, one line each.
-    pub warnings: Vec<String>,
-    /// What is wrong with the materials, which matters only to those who use them.
-    pub material_warnings: Vec<String>,
-}
-
-/// One mesh of a file.
-#[derive(Clone, Debug)]
-pub struct Part {
-    /// The mesh.
-    pub mesh: Mesh,
-    /// Index into [`ObjFile::materials`].
-    pub material: Option<usize>,
-}
-
 /// Reads the `.obj` at `path` and the `.mtl` it names; `repair`s the meshes beyond what [`Mesh::new`] does.
-pub fn read(files: Files, path: &Path, repair: bool) -> Result<ObjFile> {
+pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     let bytes = files.read(path)?;
     if bytes.contains(&0) {
         return Err(Error::input(path, 0, "is binary, not Wavefront OBJ text; export as .obj"));
@@ -70,9 +47,9 @@ pub fn read(files: Files, path: &Path, repair: bool) -> Result<ObjFile> {
     })?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let mut warnings: Vec<_> = tidy.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
-    let mut parts = parts(path, &file, &text, models, repair, &mut warnings)?;
+    let (meshes, mut parts) = parts(path, &file, &text, models, repair, &mut warnings)?;
     let materials = worn(&mut parts, materials);
-    Ok(ObjFile { parts, materials, images, warnings, material_warnings })
+    Ok(MeshFile { meshes, parts, materials, images, warnings, material_warnings, ..MeshFile::default() })
 }
 
 /// Joins the models that tobj cut a part into, and checks each part.
@@ -83,7 +60,7 @@ fn parts(
     models: Vec<tobj::Model>,
     repair: bool,
     warnings: &mut Vec<String>,
-) -> Result<Vec<Part>> {
+) -> Result<(Vec<Mesh>, Vec<Part>)> {
     let mut raw: Vec<(RawMesh, Option<usize>)> = Vec::new();
     let mut numbers = HashMap::new();
     for tobj::Model { mesh, name } in models {
@@ -100,15 +77,14 @@ fn parts(
         part.triangles.extend(triangles.map(|triangle| triangle.map(|vertex| vertex + offset)));
     }
     let several = raw.len() > 1;
-    let mut parts = Vec::new();
+    let (mut meshes, mut parts) = (Vec::new(), Vec::new());
     let mut lost = 0;
     for (mut part, material) in raw {
         part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
-        let mending = if repair { mend(&mut part) } else { Mending::default() };
-        match Mesh::new(part) {
+        match Mesh::mended(part, repair) {
             Ok(mesh) => {
-                warnings.extend(mending.told(&mesh));
-                parts.push(Part { mesh, material });
+                parts.push(Part { mesh: meshes.len(), material, transform: DAffine3::IDENTITY, object: 0 });
+                meshes.push(mesh);
             }
             Err(Refusal::NoTriangles { degenerate }) => lost += degenerate,
             Err(refusal) => {
@@ -123,45 +99,5 @@ fn parts(
     if lost > 0 {
         warnings.push(format!("{file}: {lost} degenerate triangles removed, and the parts that held nothing else"));
     }
-    Ok(parts)
-}
-
-/// The materials that parts wear: a library may hold many more, and their images.
-fn worn(parts: &mut [Part], materials: Vec<Material>) -> Vec<Material> {
-    let mut numbers = vec![None; materials.len()];
-    let mut count = 0;
-    for number in parts.iter_mut().filter_map(|part| part.material.as_mut()) {
-        *number = *numbers[*number].get_or_insert_with(|| {
-            count += 1;
-            count - 1
-        });
-    }
-    let mut worn: Vec<_> = numbers.into_iter().zip(materials).filter_map(|(number, m)| Some((number?, m))).collect();
-    worn.sort_by_key(|(number, _)| *number);
-    worn.into_iter().map(|(_, material)| material).collect()
-}
-
-/// Keeps the first of the remarks from `start` on, and says how many more of `what` there are.
-pub fn shorten(remarks: &mut Vec<String>, start: usize, what: &str) {
-    const MOST: usize = 8;
-    let more = remarks.len().saturating_sub(start + MOST);
-    if more > 0 {
-        remarks.truncate(start + MOST);
-        remarks.push(format!("... {more} more {what}"));
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn many_remarks_become_a_few() {
-        let mut remarks: Vec<_> = (0..10).map(|number| format!("fault {number}")).collect();
-        shorten(&mut remarks, 2, "faults");
-        assert_eq!((remarks.len(), remarks[9].as_str()), (10, "fault 9"));
-        remarks.push("fault 10".into());
-        shorten(&mut remarks, 2, "faults");
-        assert_eq!((remarks.len(), remarks[10].as_str()), (11, "... 1 more faults"));
-    }
+    Ok((meshes, parts))
 }

@@ -4,9 +4,11 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
+use glam::DVec3;
 use half::f16;
 
 use super::files::Files;
+use super::mesh_file::{Image, ImageSource};
 use crate::Result;
 use crate::image::{self, Stored};
 
@@ -33,9 +35,9 @@ pub enum Texels {
 }
 
 impl Texture {
-    /// Reads the image at `path`; values that are no reflectance are moved to one and told in `warnings`.
-    pub fn read(files: Files, path: &Path, warnings: &mut Vec<String>) -> Result<Self> {
-        let (width, height, texels) = match image::decode_stored(path, &files.read(path)?)? {
+    /// The image at `path`, of these bytes; values that are no reflectance are moved to one and told in `warnings`.
+    pub fn decode(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Self> {
+        let (width, height, texels) = match image::decode_stored(path, bytes)? {
             Stored::Srgb { width, height, pixels } => {
                 (width, height, Texels::Srgb(pixels.into_iter().map(|[r, g, b]| [r, g, b, u8::MAX]).collect()))
             }
@@ -55,6 +57,21 @@ impl Texture {
         Ok(Self { path: path.into(), width, height, texels })
     }
 
+    /// Multiplies every texel.
+    fn scale(&mut self, factor: DVec3) {
+        let factor = factor.as_vec3().to_array();
+        let scaled = |[r, g, b]: [f32; 3]| {
+            let [x, y, z] = factor;
+            [f16::from_f32(r * x), f16::from_f32(g * y), f16::from_f32(b * z), f16::ONE]
+        };
+        self.texels = Texels::Linear(match &self.texels {
+            Texels::Srgb(texels) => {
+                texels.iter().map(|&[r, g, b, _]| scaled([r, g, b].map(image::decode_srgb))).collect()
+            }
+            Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| scaled([r, g, b].map(f16::to_f32))).collect(),
+        });
+    }
+
     /// The file's name, for messages.
     pub fn name(&self) -> String {
         name(&self.path)
@@ -65,23 +82,42 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
+/// What tells textures apart: the file, and the bits of its factor.
+type Key = (PathBuf, [u64; 3]);
+
 /// The textures so far.
 #[derive(Debug, Default)]
 pub struct Textures {
     /// In the order in which they were named first.
     pub all: Vec<Arc<Texture>>,
-    numbers: HashMap<PathBuf, usize>,
+    numbers: HashMap<Key, usize>,
 }
 
 impl Textures {
     /// The number in [`Textures::all`] of the image at `path`, which is read unless it was before.
     pub fn open(&mut self, files: Files, path: &Path, warnings: &mut Vec<String>) -> Result<usize> {
-        let identity = files.identity(path);
-        if let Some(&number) = self.numbers.get(&identity) {
+        self.open_image(files, &Image::file(path.into()), warnings)
+    }
+
+    /// The same of an image that a mesh file names.
+    pub fn open_image(&mut self, files: Files, image: &Image, warnings: &mut Vec<String>) -> Result<usize> {
+        let identity = match &image.source {
+            ImageSource::File(path) => files.identity(path),
+            ImageSource::Embedded { name, .. } => name.clone(),
+        };
+        let key = (identity, image.factor.to_array().map(f64::to_bits));
+        if let Some(&number) = self.numbers.get(&key) {
             return Ok(number);
         }
-        self.all.push(Arc::new(Texture::read(files, path, warnings)?));
-        self.numbers.insert(identity, self.all.len() - 1);
+        let mut texture = match &image.source {
+            ImageSource::File(path) => Texture::decode(path, &files.read(path)?, warnings)?,
+            ImageSource::Embedded { name, bytes } => Texture::decode(name, bytes, warnings)?,
+        };
+        if image.factor != DVec3::ONE {
+            texture.scale(image.factor);
+        }
+        self.all.push(Arc::new(texture));
+        self.numbers.insert(key, self.all.len() - 1);
         Ok(self.all.len() - 1)
     }
 }

@@ -3,6 +3,7 @@
 #![allow(dead_code, reason = "each test program uses its share")]
 
 pub mod desktop;
+pub mod gltf;
 pub mod pictures;
 pub mod reference;
 pub mod tables;
