@@ -296,6 +296,10 @@ pub struct RenderArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub set: Option<Vec<String>>,
 
+    /// Repairs meshes: welds vertices along cracks, drops duplicate faces, turns triangles to agree with their neighbours, and says so
+    #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
+    pub repair: Option<bool>,
+
     /// Leaves the options aside that the scene's table 'render' has
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
     pub no_render_table: Option<bool>,
@@ -384,6 +388,7 @@ impl RenderArgs {
             roughness: self.roughness.or(fallback.roughness),
             env: self.env.or(fallback.env),
             set: self.set.or(fallback.set),
+            repair: self.repair.or(fallback.repair),
             no_render_table: self.no_render_table.or(fallback.no_render_table),
             exposure: self.exposure.or(fallback.exposure),
             tonemap: self.tonemap.or(fallback.tonemap),
@@ -424,6 +429,7 @@ impl RenderArgs {
             ("ior", text(self.ior.as_ref().map(|x| x as _))),
             ("roughness", text(self.roughness.as_ref().map(|x| x as _))),
             ("env", self.env.as_ref().map(|path| path.display().to_string())),
+            ("repair", text(self.repair.as_ref().map(|x| x as _))),
             ("exposure", text(self.exposure.as_ref().map(|x| x as _))),
             ("tonemap", self.tonemap.map(|curve| curve.name().to_owned())),
             ("aov", self.aov.as_ref().map(|aovs| aovs.iter().map(|aov| aov.name()).collect::<Vec<_>>().join(","))),

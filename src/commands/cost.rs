@@ -151,7 +151,7 @@ impl CostCommand {
     fn command(&self) -> String {
         let text = |value: Option<&dyn std::fmt::Display>| value.map(|value| value.to_string());
         let path = |path: &PathBuf| path.display().to_string();
-        let Changes { ior, roughness, env, set } = &self.changes;
+        let Changes { ior, roughness, env, set, repair } = &self.changes;
         let options = [
             ("size", text(self.size.as_ref().map(|x| x as _))),
             ("reference-time", text(self.reference_time.as_ref().map(|x| x as _))),
@@ -167,8 +167,14 @@ impl CostCommand {
         ];
         let given = options.into_iter().filter_map(|(name, value)| Some(format!("--{name}={}", value?)));
         let settings = set.iter().map(|setting| format!("--set={setting}"));
+        let repair = repair.then(|| "--repair".to_owned());
         let scene = self.scene.as_ref().map(path);
-        let words = ["vitrum".to_owned(), "cost".to_owned()].into_iter().chain(given).chain(settings).chain(scene);
+        let words = ["vitrum".to_owned(), "cost".to_owned()]
+            .into_iter()
+            .chain(given)
+            .chain(repair)
+            .chain(settings)
+            .chain(scene);
         shell::line(words)
     }
 }

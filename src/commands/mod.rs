@@ -75,6 +75,10 @@ struct Changes {
     /// Sets one value of the scene, as its file would: material.glass.ior=1.7, camera.vertical_fov=20, environment.rotation=90; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<String>,
+
+    /// Repairs meshes: welds vertices along cracks, drops duplicate faces, turns triangles to agree with their neighbours, and says so
+    #[arg(long)]
+    repair: bool,
 }
 
 impl Changes {
@@ -84,6 +88,7 @@ impl Changes {
             roughness: self.roughness,
             environment: self.env.clone(),
             settings: self.set.clone(),
+            repair: self.repair.then_some(true),
             no_render_table: false,
         }
     }

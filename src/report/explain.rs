@@ -5,6 +5,7 @@ use std::fmt;
 
 use serde::Serialize;
 
+use super::objects::{NestingRow, ObjectRow};
 use super::plan::PlanRow;
 use crate::Result;
 use crate::choice::Choice;
@@ -32,6 +33,8 @@ pub struct Explanation {
     pub effects: Vec<EffectRow>,
     pub models: Vec<ModelRow>,
     pub meshes: Vec<MeshRow>,
+    pub objects: Vec<ObjectRow>,
+    pub nesting: NestingRow,
     pub touching: Vec<TouchRow>,
     pub warnings: Vec<String>,
     pub plan: Option<PlanRow>,
@@ -144,6 +147,8 @@ impl Explanation {
             effects: Effect::all().map(row).collect(),
             models: plans.iter().map(ModelRow::new).collect(),
             meshes: (0..scene.meshes.len()).map(|mesh| MeshRow::new(scene, mesh)).collect(),
+            objects: scene.diagnose().iter().map(|diagnosis| ObjectRow::new(scene, diagnosis)).collect(),
+            nesting: NestingRow::new(scene),
             touching: scene.touching().iter().map(|touch| TouchRow::new(touch, scene)).collect(),
             warnings: scene.warnings.clone(),
             plan: None,
@@ -382,6 +387,15 @@ impl fmt::Display for Explanation {
         if meshes.len() > MOST_NAMED {
             writeln!(f, "  and {} more", meshes.len() - MOST_NAMED)?;
         }
+        let ailing: Vec<_> = self.objects.iter().filter(|object| !object.is_well()).collect();
+        for (i, object) in ailing.iter().take(MOST_NAMED).enumerate() {
+            let title = if i == 0 { "\nWhat ails objects\n" } else { "" };
+            writeln!(f, "{title}{object}")?;
+        }
+        if ailing.len() > MOST_NAMED {
+            writeln!(f, "  and {} more", ailing.len() - MOST_NAMED)?;
+        }
+        write!(f, "{}", self.nesting)?;
         for (i, touch) in self.touching.iter().enumerate() {
             let title = if i == 0 { "\nWalls at one place\n" } else { "" };
             writeln!(f, "{title}  {touch}")?;
@@ -399,7 +413,7 @@ mod tests {
     use std::sync::Arc;
     use std::time::Duration;
 
-    use glam::DVec3;
+    use glam::{DAffine3, DVec3};
     use serde_json::Value;
 
     use super::*;
@@ -531,8 +545,12 @@ mod tests {
         let mut scene = lit(1);
         Arc::make_mut(&mut scene.meshes[0]).overlaps = true;
         scene.camera.position = scene.bounds_of(&scene.objects[0]).center();
-        // A body once more at its own place.
+        // A body once more at its own place, and once more through its own walls, with a face that is there twice.
         scene.objects.push(scene.objects[2].clone());
+        let aside = DAffine3::from_translation(DVec3::new(0.002, 0.0, 0.0)) * scene.objects[2].transform;
+        scene.objects.push(Object { transform: aside, ..scene.objects[2].clone() });
+        let twice = scene.meshes[2].triangles[0];
+        Arc::make_mut(&mut scene.meshes[2]).triangles.push(twice);
         let args = RenderArgs::default();
         let best = Candidate { args, model: Model::Tree, samples: 4, ms: 10.0, error: 0.04, lacks: 0 };
         let goal = Goal { tolerance: Some(0.05), seconds: Some(1.0) };

@@ -6,6 +6,7 @@ mod cost_page;
 mod explain;
 mod numerics;
 mod numerics_page;
+mod objects;
 mod picture;
 mod plan;
 mod plots;

@@ -23,6 +23,8 @@ pub struct Assembly {
     pub materials: Vec<Material>,
     pub textures: Textures,
     pub warnings: Vec<String>,
+    /// Meshes are mended beyond what [`Mesh::new`] does.
+    repair: bool,
     read: HashMap<PathBuf, Loaded>,
     clear_glass: Option<usize>,
 }
@@ -59,6 +61,11 @@ pub enum Wear {
 }
 
 impl Assembly {
+    /// Nothing yet; meshes to come are mended where `repair` says so.
+    pub fn new(repair: Option<bool>) -> Self {
+        Self { repair: repair == Some(true), ..Self::default() }
+    }
+
     /// Reads mesh files ahead, several at once. The first that cannot be read is the error.
     pub fn read_ahead<'a>(&mut self, files: Files, paths: impl Iterator<Item = &'a Path>) -> Result<()> {
         let mut distinct: Vec<(PathBuf, &Path)> = Vec::new();
@@ -68,10 +75,13 @@ impl Assembly {
                 distinct.push((identity, path));
             }
         }
+        let repair = self.repair;
         let next = AtomicUsize::new(0);
         let work = || {
             let next = || distinct.get(next.fetch_add(1, Ordering::Relaxed));
-            std::iter::from_fn(next).map(|(identity, path)| (identity, MeshFile::read(files, path))).collect::<Vec<_>>()
+            std::iter::from_fn(next)
+                .map(|(identity, path)| (identity, MeshFile::read(files, path, repair)))
+                .collect::<Vec<_>>()
         };
         let workers = std::thread::available_parallelism().map_or(1, usize::from).min(distinct.len());
         let mut results: HashMap<_, _> = std::thread::scope(|scope| {
@@ -98,7 +108,7 @@ impl Assembly {
     pub fn add(&mut self, files: Files, path: &Path, wear: Wear, place: &Placement) -> Result<Option<&mut MeshFile>> {
         let identity = files.identity(path);
         if !self.read.contains_key(&identity) {
-            let file = MeshFile::read(files, path)?;
+            let file = MeshFile::read(files, path, self.repair)?;
             self.keep(identity.clone(), file);
         }
         let Some(Loaded { file, first_mesh, first_material }) = self.read.get_mut(&identity) else { return Ok(None) };

@@ -43,6 +43,11 @@ impl Bounds {
         self.min.cmple(point).all() && point.cmple(self.max).all()
     }
 
+    /// Whether all of it is inside of `other` or on its faces.
+    pub fn is_within(&self, other: &Self) -> bool {
+        other.contains(self.min) && other.contains(self.max)
+    }
+
     /// Whether the boxes share a point.
     pub fn intersects(&self, other: &Self) -> bool {
         self.min.cmple(other.max).all() && other.min.cmple(self.max).all()
@@ -79,6 +84,7 @@ mod tests {
     fn faces_belong_to_the_box() {
         assert!(UNIT.contains(DVec3::ONE) && UNIT.contains(DVec3::ZERO));
         assert!(!UNIT.contains(DVec3::new(0.5, 1.0 + 1e-12, 0.5)));
+        assert!(UNIT.is_within(&UNIT) && !UNIT.is_within(&Bounds { max: DVec3::new(1.0, 1.0, 0.9), ..UNIT }));
         assert!(UNIT.intersects(&Bounds { min: DVec3::ONE, max: DVec3::splat(2.0) }));
         assert!(!UNIT.intersects(&Bounds { min: DVec3::new(0.0, 0.0, 1.1), max: DVec3::splat(2.0) }));
     }

@@ -14,7 +14,7 @@ use super::render_table::options;
 use super::table::{
     Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT, text,
 };
-use super::{Camera, Dielectric, Dispersion, Material, Opaque, PointLight, Surface, builtin};
+use super::{Camera, Dielectric, Dispersion, Material, Opaque, Overrides, PointLight, Surface, builtin};
 use crate::Result;
 use crate::options::RenderArgs;
 
@@ -56,8 +56,8 @@ pub struct SceneFile {
     pub assembly: Assembly,
 }
 
-/// Reads the scene file at `path`.
-pub fn read(files: Files, path: &Path) -> Result<SceneFile> {
+/// Reads the scene file at `path`; `overrides` tell whether its meshes are repaired.
+pub fn read(files: Files, path: &Path, overrides: &Overrides) -> Result<SceneFile> {
     let bytes = files.read(path)?;
     let document = Document { path, text: text(path, &bytes)? };
     let parsed = document.parse()?;
@@ -68,7 +68,8 @@ pub fn read(files: Files, path: &Path) -> Result<SceneFile> {
     let camera = root.get("camera").map(camera).transpose()?;
     let render = root.or("render", RenderArgs::default(), |entry| options(entry, "render", files, reader.folder))?;
     let lights = root.or("light", Vec::new(), |entry| entry.tables()?.into_iter().map(light).collect())?;
-    let mut assembly = Assembly::default();
+    let own = render.repair.filter(|_| !overrides.no_render_table);
+    let mut assembly = Assembly::new(overrides.repair.or(own));
     if let Some(materials) = root.get("material") {
         for entry in materials.any_table("material.NAME")?.entries() {
             let surface = reader.surface(entry, &mut assembly)?;

@@ -10,6 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use serde::Serialize;
 
 use super::Bounds;
+use super::doctor::{Mending, mend};
 use super::topology::{self, Topology};
 
 /// The farthest a vertex, light or camera may lie from the origin. The renderer's 32-bit arithmetic squares areas:
@@ -33,6 +34,10 @@ pub struct Mesh {
     pub triangles: Vec<[u32; 3]>,
     /// What was wrong.
     pub faults: MeshFaults,
+    /// Where it was.
+    pub sites: FaultSites,
+    /// What was mended before that.
+    pub mending: Mending,
     /// Whether it may hold bodies that overlap.
     pub overlaps: bool,
 }
@@ -73,6 +78,19 @@ pub struct MeshFaults {
     pub replaced_uvs: usize,
     /// Normals that point to the inside of a face around them.
     pub opposed_normals: usize,
+}
+
+/// The first place of each fault, in the mesh's space.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct FaultSites {
+    /// The middle of an edge of one triangle only.
+    pub open_edge: Option<DVec3>,
+    /// The middle of an edge of more than two triangles.
+    pub non_manifold_edge: Option<DVec3>,
+    /// The middle of an edge whose triangles do not agree.
+    pub inconsistent_edge: Option<DVec3>,
+    /// A vertex of a shell that was inside out.
+    pub inverted_shell: Option<DVec3>,
 }
 
 /// Why a mesh cannot be used.
@@ -176,7 +194,7 @@ impl Mesh {
         if let Some(first) = triangles.iter().position(bad) {
             return Err(Refusal::BadIndices { count: triangles.iter().filter(|t| bad(t)).count(), first, vertices });
         }
-        let Topology { inverted: turned, overlaps } = topology::analyse(&positions, &triangles, &mut faults);
+        let Topology { inverted: turned, overlaps, sites } = topology::analyse(&positions, &triangles, &mut faults);
         let mut inverted = vec![false; if turned.is_empty() { 0 } else { vertices }];
         for number in turned {
             let triangle = &mut triangles[number as usize];
@@ -193,7 +211,8 @@ impl Mesh {
         let mut used = vec![false; vertices];
         triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
         faults.unused_vertices = used.iter().filter(|used| !**used).count();
-        let mut mesh = Self { name, positions, normals, uvs, triangles, faults, overlaps };
+        let mut mesh =
+            Self { name, positions, normals, uvs, triangles, faults, sites, mending: Mending::default(), overlaps };
         if mesh.normals.len() != vertices {
             mesh.normals.clear();
         }
@@ -204,6 +223,12 @@ impl Mesh {
         mesh.mend_normals(&used);
         mesh.mend_uvs(&used);
         Ok(mesh)
+    }
+
+    /// The same of what is mended first, if `repair` says so.
+    pub fn mended(mut raw: RawMesh, repair: bool) -> Result<Self, Refusal> {
+        let mending = if repair { mend(&mut raw) } else { Mending::default() };
+        Ok(Self { mending, ..Self::new(raw)? })
     }
 
     /// The box around the mesh in its own space.
@@ -266,7 +291,7 @@ impl Mesh {
 }
 
 /// The normal with the length of twice the area.
-fn area_vector(positions: &[[f32; 3]], triangle: [u32; 3]) -> DVec3 {
+pub fn area_vector(positions: &[[f32; 3]], triangle: [u32; 3]) -> DVec3 {
     let [a, b, c] = triangle.map(|vertex| {
         let [x, y, z] = positions[vertex as usize];
         DVec3::new(x.into(), y.into(), z.into())

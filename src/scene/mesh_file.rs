@@ -78,11 +78,12 @@ impl Image {
 }
 
 impl MeshFile {
-    /// Reads the mesh file at `path`, of a kind that [`check_kind`] lets pass.
-    pub fn read(files: Files, path: &Path) -> Result<Self> {
+    /// Reads the mesh file at `path`, of a kind that [`check_kind`] lets pass; `repair`s the meshes beyond what
+    /// [`Mesh::new`] does.
+    pub fn read(files: Files, path: &Path, repair: bool) -> Result<Self> {
         match is_gltf(path) {
-            true => gltf::read(files, path),
-            false => obj::read(files, path),
+            true => gltf::read(files, path, repair),
+            false => obj::read(files, path, repair),
         }
     }
 }

@@ -9,6 +9,7 @@ mod bounds;
 mod builtin;
 mod camera;
 mod containment;
+mod doctor;
 mod environment;
 mod file;
 mod files;
@@ -25,6 +26,7 @@ pub(crate) mod table;
 mod texture;
 mod topology;
 mod touching;
+mod walls;
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -34,10 +36,11 @@ use glam::{DAffine3, DVec3};
 
 pub use bounds::Bounds;
 pub use camera::Camera;
+pub use doctor::{Ailment, Diagnosis, Finding, Mending, Nest, Nesting};
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
 pub(crate) use files::Files;
 pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
-pub use mesh::{Mesh, MeshFaults, RawMesh, Refusal};
+pub use mesh::{FaultSites, Mesh, MeshFaults, RawMesh, Refusal};
 pub use texture::{Texels, Texture};
 pub use touching::Touch;
 
@@ -112,6 +115,8 @@ pub struct Overrides {
     pub environment: Option<PathBuf>,
     /// Single values, as [`Scene::set`] takes them; they win over the others.
     pub settings: Vec<String>,
+    /// Meshes are repaired, or not, whatever the scene's own render options say: docs/doctor.md.
+    pub repair: Option<bool>,
     /// The scene's own render options count for nothing.
     pub no_render_table: bool,
 }
@@ -126,8 +131,8 @@ impl Scene {
         let name = path.display().to_string();
         let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
         let mut scene = match extension.as_deref() {
-            Some("toml") => Self::from_file(file::read(Files::Disk, path)?, name, overrides),
-            Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path)?, name, overrides),
+            Some("toml") => Self::from_file(file::read(Files::Disk, path, overrides)?, name, overrides),
+            Some("obj" | "glb" | "gltf") => Self::from_file(bare_mesh(path, overrides)?, name, overrides),
             _ if path.is_dir() => {
                 Err(Error::input(path, 0, "is a folder; name a .toml (scene), .glb, .gltf or .obj (mesh) in it"))
             }
@@ -152,7 +157,7 @@ impl Scene {
     }
 
     fn built_in(path: &str, name: &str, overrides: &Overrides) -> Result<Self> {
-        Self::from_file(file::read(Files::BuiltIn, Path::new(path))?, name.into(), overrides)
+        Self::from_file(file::read(Files::BuiltIn, Path::new(path), overrides)?, name.into(), overrides)
     }
 
     fn from_file(file: SceneFile, name: String, overrides: &Overrides) -> Result<Self> {
@@ -251,6 +256,9 @@ fn faults_of_meshes(objects: &[Object], meshes: &[Arc<Mesh>], materials: &[Mater
         warnings.push(format!("{}: {faults}{advice}", mesh.name));
     }
     shorten(&mut warnings, 0, "meshes have faults");
+    let before = warnings.len();
+    warnings.extend(meshes.iter().filter_map(|mesh| mesh.mending.told(mesh)));
+    shorten(&mut warnings, before, "meshes were repaired");
     warnings
 }
 
@@ -280,9 +288,9 @@ fn warn_of_missing_uvs(
 }
 
 /// A mesh file in the default environment: glTF as the scene that it is, anything else as clear glass.
-fn bare_mesh(path: &Path) -> Result<SceneFile> {
+fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
     mesh_file::check_kind(path).map_err(|message| Error::input(path, 0, message))?;
-    let mut assembly = Assembly::default();
+    let mut assembly = Assembly::new(overrides.repair);
     let (wear, number) = match mesh_file::is_gltf(path) {
         true => (Wear::Own, None),
         false => (Wear::ClearGlass, Some(0)),
@@ -307,6 +315,7 @@ impl Overrides {
             roughness: args.roughness,
             environment: args.env.clone(),
             settings: args.set.clone().unwrap_or_default(),
+            repair: args.repair,
             no_render_table: args.no_render_table == Some(true),
         }
     }

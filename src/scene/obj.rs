@@ -16,8 +16,8 @@ use super::mtl;
 use super::obj_text::{Tidy, bad_number};
 use crate::{Error, Result};
 
-/// Reads the `.obj` at `path` and the `.mtl` it names.
-pub fn read(files: Files, path: &Path) -> Result<MeshFile> {
+/// Reads the `.obj` at `path` and the `.mtl` it names; `repair`s the meshes beyond what [`Mesh::new`] does.
+pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     let bytes = files.read(path)?;
     if bytes.contains(&0) {
         return Err(Error::input(path, 0, "is binary, not Wavefront OBJ text; export as .obj"));
@@ -47,7 +47,7 @@ pub fn read(files: Files, path: &Path) -> Result<MeshFile> {
     })?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let mut warnings: Vec<_> = tidy.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
-    let (meshes, mut parts) = parts(path, &file, &text, models, &mut warnings)?;
+    let (meshes, mut parts) = parts(path, &file, &text, models, repair, &mut warnings)?;
     let materials = worn(&mut parts, materials);
     Ok(MeshFile { meshes, parts, materials, images, warnings, material_warnings, ..MeshFile::default() })
 }
@@ -58,6 +58,7 @@ fn parts(
     file: &str,
     text: &str,
     models: Vec<tobj::Model>,
+    repair: bool,
     warnings: &mut Vec<String>,
 ) -> Result<(Vec<Mesh>, Vec<Part>)> {
     let mut raw: Vec<(RawMesh, Option<usize>)> = Vec::new();
@@ -80,7 +81,7 @@ fn parts(
     let mut lost = 0;
     for (mut part, material) in raw {
         part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
-        match Mesh::new(part) {
+        match Mesh::mended(part, repair) {
             Ok(mesh) => {
                 parts.push(Part { mesh: meshes.len(), material, transform: DAffine3::IDENTITY, object: 0 });
                 meshes.push(mesh);

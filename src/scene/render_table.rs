@@ -32,7 +32,7 @@ fn option(entry: Entry<'_>, files: Files, folder: &Path) -> Result<OsString> {
             None => entry.integer()?.to_string(),
         },
         "samples" | "max_depth" | "seed" => entry.integers::<1>("a whole number")?[0].to_string(),
-        "validation" | "flipped_ratio" => entry.boolean()?.to_string(),
+        "validation" | "flipped_ratio" | "repair" => entry.boolean()?.to_string(),
         "model" | "tonemap" | "trace" => entry.text("a name")?.to_owned(),
         _ => entry.number(&FINITE)?.to_string(),
     };

@@ -1,4 +1,5 @@
-//! What is wrong with a surface as the boundary of a medium. In flow positions and triangles, out flow counts.
+//! What is wrong with a surface as the boundary of a medium. In flow positions and triangles, out flow counts
+//! and the first place of each fault.
 //!
 //! Vertices are welded by exact position first: files split vertices where normals or texture coordinates differ.
 
@@ -6,7 +7,7 @@ use glam::DVec3;
 
 use super::Bounds;
 use super::containment::winding_number;
-use super::mesh::MeshFaults;
+use super::mesh::{FaultSites, MeshFaults};
 
 /// How many triangles may be visited to find out which shell holds which; beyond that bounding boxes decide.
 const WINDING_BUDGET: usize = 10_000_000;
@@ -16,13 +17,16 @@ const WINDING_BUDGET: usize = 10_000_000;
 const MOST_PAIRS: usize = 100_000_000;
 
 /// A welded, connected piece of a surface.
-struct Shell {
-    triangles: Vec<[u32; 3]>,
+pub struct Shell {
+    /// By welded vertices.
+    pub triangles: Vec<[u32; 3]>,
     /// Where in the mesh they come from.
-    numbers: Vec<u32>,
-    bounds: Bounds,
+    pub numbers: Vec<u32>,
+    /// The box around them.
+    pub bounds: Bounds,
     closed: bool,
-    volume: f64,
+    /// Below 0 where the outside is inside.
+    pub volume: f64,
 }
 
 /// What is known of a surface beyond its faults.
@@ -31,10 +35,35 @@ pub struct Topology {
     pub inverted: Vec<u32>,
     /// Whether two of its bodies may overlap: their bounding boxes do.
     pub overlaps: bool,
+    /// Where the faults are.
+    pub sites: FaultSites,
 }
 
 /// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`.
 pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Topology {
+    let mut sites = FaultSites::default();
+    let shells = pieces(positions, triangles, faults, &mut sites);
+    let inverted = inverted_shells(&shells, positions);
+    faults.inverted_shells = inverted.len();
+    sites.inverted_shell = inverted.first().map(|shell| place(positions, shell.triangles[0][0]));
+    Topology {
+        overlaps: overlaps(&shells, &inverted),
+        sites,
+        inverted: inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect(),
+    }
+}
+
+/// The pieces of a surface.
+pub fn shells_of(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<Shell> {
+    pieces(positions, triangles, &mut MeshFaults::default(), &mut FaultSites::default())
+}
+
+fn pieces(
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    faults: &mut MeshFaults,
+    sites: &mut FaultSites,
+) -> Vec<Shell> {
     let welded = weld(positions);
     // A triangle that welding folds up has edges that cancel out.
     let (numbers, triangles): (Vec<u32>, Vec<[u32; 3]>) = (0..)
@@ -42,14 +71,8 @@ pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut Mesh
         .map(|(number, triangle)| (number, triangle.map(|vertex| welded[vertex as usize])))
         .filter(|(_, [a, b, c])| a != b && b != c && c != a)
         .unzip();
-    let faulty = faulty_edges(&triangles, faults);
-    let shells = shells(positions, &numbers, triangles, &faulty);
-    let inverted = inverted_shells(&shells, positions);
-    faults.inverted_shells = inverted.len();
-    Topology {
-        overlaps: overlaps(&shells, &inverted),
-        inverted: inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect(),
-    }
+    let faulty = faulty_edges(positions, &triangles, faults, sites);
+    shells(positions, &numbers, triangles, &faulty)
 }
 
 /// Whether the boxes of two shells meet that both are bodies and no cavities; yes where they are too many to tell.
@@ -61,7 +84,7 @@ fn overlaps(shells: &[Shell], inverted: &[&Shell]) -> bool {
 }
 
 /// For each vertex the first one, in the order of their bits, at the same place.
-fn weld(positions: &[[f32; 3]]) -> Vec<u32> {
+pub fn weld(positions: &[[f32; 3]]) -> Vec<u32> {
     // Adding zero turns -0 into +0, which is the same place.
     let bits = |vertex: u32| positions[vertex as usize].map(|coordinate| (coordinate + 0.0).to_bits());
     let mut order: Vec<([u32; 3], u32)> = (0..positions.len() as u32).map(|vertex| (bits(vertex), vertex)).collect();
@@ -78,7 +101,12 @@ fn weld(positions: &[[f32; 3]]) -> Vec<u32> {
 }
 
 /// Counts the edges that do not join two triangles of one orientation and returns a vertex of each unbalanced one.
-fn faulty_edges(triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Vec<u32> {
+fn faulty_edges(
+    positions: &[[f32; 3]],
+    triangles: &[[u32; 3]],
+    faults: &mut MeshFaults,
+    sites: &mut FaultSites,
+) -> Vec<u32> {
     // One word an edge: the lower vertex, the higher one (no file that is read has 2^31), the direction.
     let mut edges = Vec::with_capacity(triangles.len() * 3);
     for &[a, b, c] in triangles {
@@ -92,16 +120,21 @@ fn faulty_edges(triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Vec<u32> {
     for same in edges.chunk_by(|a, b| a >> 1 == b >> 1) {
         let backward = same.iter().filter(|&edge| edge & 1 == 1).count();
         let balanced = backward * 2 == same.len();
-        match same.len() {
-            1 => faults.open_edges += 1,
-            2 => faults.inconsistent_edges += usize::from(!balanced),
-            _ => {
-                faults.non_manifold_edges += 1;
-                faults.inconsistent_edges += usize::from(!balanced);
-            }
+        let [low, high] = [same[0] >> 32, (same[0] & 0xffff_ffff) >> 1].map(|vertex| vertex as u32);
+        let middle = || (place(positions, low) + place(positions, high)) * 0.5;
+        if same.len() == 1 {
+            faults.open_edges += 1;
+            sites.open_edge.get_or_insert_with(middle);
+        } else if !balanced {
+            faults.inconsistent_edges += 1;
+            sites.inconsistent_edge.get_or_insert_with(middle);
+        }
+        if same.len() > 2 {
+            faults.non_manifold_edges += 1;
+            sites.non_manifold_edge.get_or_insert_with(middle);
         }
         if !balanced {
-            faulty.push((same[0] >> 32) as u32);
+            faulty.push(low);
         }
     }
     faulty
@@ -184,7 +217,8 @@ fn inverted_shells<'a>(shells: &'a [Shell], positions: &[[f32; 3]]) -> Vec<&'a S
     inside_out.into_iter().filter(|shell| !is_cavity(shell)).collect()
 }
 
-fn place(positions: &[[f32; 3]], vertex: u32) -> DVec3 {
+/// Where a vertex is.
+pub fn place(positions: &[[f32; 3]], vertex: u32) -> DVec3 {
     let [x, y, z] = positions[vertex as usize];
     DVec3::new(x.into(), y.into(), z.into())
 }

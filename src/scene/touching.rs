@@ -2,18 +2,13 @@
 //!
 //! Which of two such walls a ray meets first is up to rounding: liquid in a glass has to overlap its wall, or to stay clear of it.
 
-use std::time::Duration;
-
 use glam::DVec3;
-use obvhs::BvhBuildParams;
-use obvhs::aabb::Aabb;
-use obvhs::bvh2::Bvh2;
-use obvhs::bvh2::builder::build_bvh2;
 
+use super::walls::{Walls, lies_on, middle, normal};
 use super::{Bounds, Object, Scene, Surface};
 
 /// How far apart walls are that count as touching, in the size of the smaller body, and how parallel.
-const NEAR: f64 = 1e-5;
+pub const NEAR: f64 = 1e-5;
 const PARALLEL: f64 = 0.9999;
 
 /// Pairs of bodies that are looked at.
@@ -40,7 +35,8 @@ impl Scene {
         let mut found = Vec::new();
         for (a, b) in meet {
             for body in [a, b] {
-                walls[body].get_or_insert_with(|| Walls::new(self, &self.objects[bodies[body]]));
+                let object = &self.objects[bodies[body]];
+                walls[body].get_or_insert_with(|| Walls::new(&self.meshes[object.mesh], &object.transform));
             }
             let (Some(first), Some(second)) = (&walls[a], &walls[b]) else { continue };
             let near = NEAR * bounds[a].extent().max_element().min(bounds[b].extent().max_element());
@@ -56,74 +52,30 @@ impl Scene {
     }
 }
 
-/// The triangles of a body in the world, and a hierarchy over them.
-struct Walls {
-    triangles: Vec<[DVec3; 3]>,
-    bvh: Bvh2,
-}
-
 impl Walls {
-    fn new(scene: &Scene, object: &Object) -> Self {
-        let mesh = &scene.meshes[object.mesh];
-        let place = |&vertex: &u32| {
-            object.transform.transform_point3(DVec3::from_array(mesh.positions[vertex as usize].map(f64::from)))
-        };
-        let triangles: Vec<[DVec3; 3]> =
-            mesh.triangles.iter().map(|triangle| std::array::from_fn(|i| place(&triangle[i]))).collect();
-        let boxes: Vec<_> =
-            triangles.iter().map(|corners| wide(Bounds::around(corners.iter().copied()), 0.0)).collect();
-        Self { triangles, bvh: build_bvh2(&boxes, BvhBuildParams::fast_build(), &mut Duration::default()) }
-    }
-
     /// How many triangles have their middle within `near` of one of `other`, which lies in `bounds`, and as it lies.
     fn on(&self, other: &Self, near: f64, bounds: &Bounds, same: bool) -> usize {
         let touches = |(number, corners): &(usize, &[DVec3; 3])| {
-            let middle = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let middle = middle(corners);
             let reach = Bounds { min: middle - near, max: middle + near };
             if !reach.intersects(bounds) {
                 return false;
             }
-            let normal = normal(corners);
+            let own = normal(corners);
             let mut found = false;
-            other.bvh.aabb_traverse(wide(reach, near), |bvh, node| {
-                let node = &bvh.nodes[node as usize];
-                let held = node.first_index as usize..(node.first_index + node.prim_count) as usize;
-                found |= bvh.primitive_indices[held].iter().any(|&candidate| {
-                    let candidate = candidate as usize;
-                    let wall = &other.triangles[candidate];
-                    // Neighbours share corners; what shares all three lies there twice.
-                    let is_neighbour =
-                        || (1..3).contains(&corners.iter().filter(|corner| wall.contains(corner)).count());
-                    !(same && (candidate == *number || is_neighbour()))
-                        && normal.dot(self::normal(wall)).abs() > PARALLEL
-                        && lies_on(middle, wall, near)
-                });
+            other.near(reach, near, |candidate| {
+                let wall = &other.triangles[candidate];
+                // Neighbours share corners; what shares all three lies there twice.
+                let is_neighbour = || (1..3).contains(&corners.iter().filter(|corner| wall.contains(corner)).count());
+                found = !(same && (candidate == *number || is_neighbour()))
+                    && own.dot(normal(wall)).abs() > PARALLEL
+                    && lies_on(middle, wall, near);
                 !found
             });
             found
         };
         self.triangles.iter().enumerate().filter(touches).count()
     }
-}
-
-fn normal([a, b, c]: &[DVec3; 3]) -> DVec3 {
-    (b - a).cross(c - a).normalize_or_zero()
-}
-
-/// Whether `point` is within `near` of the plane of the triangle, and above or below it.
-fn lies_on(point: DVec3, corners: &[DVec3; 3], near: f64) -> bool {
-    let normal = normal(corners);
-    let is_inside = |i: usize| {
-        let (from, to) = (corners[i], corners[(i + 1) % 3]);
-        (to - from).cross(point - from).dot(normal) >= -near * (to - from).length()
-    };
-    normal.dot(point - corners[0]).abs() <= near && (0..3).all(is_inside)
-}
-
-/// `bounds` with `room` on all sides, and as much as 32-bit numbers lose.
-fn wide(bounds: Bounds, room: f64) -> Aabb {
-    let room = DVec3::splat(room + 1e-6 * bounds.reach());
-    Aabb::new((bounds.min - room).as_vec3().into(), (bounds.max + room).as_vec3().into())
 }
 
 #[cfg(test)]

@@ -404,6 +404,7 @@ fn render_options_are_checked_and_named() {
         ("size = [9, 4, 2]", "size: expected width and height, as in [1024, 768], found an array of 3"),
         ("exposure = true", "exposure: expected a finite number, found true"),
         ("aov = [1]", "aov: expected names"),
+        ("repair = \"yes\"", "repair: expected true or false, found \"yes\""),
         ("flipped_ratio = 1", "flipped_ratio: expected true or false, found 1"),
         ("speed = 1", "unknown key \"speed\" in [render]; allowed here: model, size, samples"),
     ] {

@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::DVec3;
-use vitrum::scene::{Dielectric, Opaque, Scene, Surface};
+use vitrum::scene::{Dielectric, Opaque, Overrides, Scene, Surface};
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
@@ -40,6 +40,34 @@ fn what_is_wrong_with_a_mesh_is_told_with_counts() {
     ] {
         let error = load(text).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
+    }
+}
+
+#[test]
+fn a_mesh_is_repaired_where_that_is_asked_for() {
+    let folder = Folder::new();
+    // A corner that is two, a face that is there twice and one that looks inwards.
+    let faulty =
+        TETRAHEDRON.replace("f 1 3 2\n", "v 1 0 2e-7\nf 1 3 5\nf 1 5 3\nf 1 3 5\n").replace("f 2 3 4", "f 2 4 3");
+    folder.write("body.obj", faulty);
+    let object = "[[object]]\nmesh = \"body.obj\"\n";
+    folder.write("own.toml", format!("[render]\nrepair = true\n{object}"));
+    folder.write("plain.toml", object);
+    let load = |name: &str, repair, no_render_table| {
+        let overrides = Overrides { repair, no_render_table, ..Overrides::default() };
+        Scene::load(Some(&folder.path(name)), &overrides).unwrap()
+    };
+    let wanted = "body.obj: repaired: 1 vertex welded, 2 duplicate faces removed, 1 triangle turned; closed now";
+    for (name, repair) in [("body.obj", Some(true)), ("plain.toml", Some(true)), ("own.toml", None)] {
+        let scene = load(name, repair, false);
+        assert_eq!(scene.warnings, [wanted], "{name}");
+        assert!(scene.meshes[0].faults.is_empty() && scene.meshes[0].triangles.len() == 4, "{name}");
+        assert!(scene.diagnose()[0].findings.is_empty(), "{name}");
+    }
+    for (name, repair, alone) in [("body.obj", None, false), ("own.toml", Some(false), false), ("own.toml", None, true)]
+    {
+        let scene = load(name, repair, alone);
+        assert!(!scene.meshes[0].faults.is_closed() && scene.meshes[0].triangles.len() == 6, "{name}");
     }
 }
 

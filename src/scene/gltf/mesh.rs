@@ -33,6 +33,8 @@ pub struct Meshes<'a> {
     file: &'a str,
     several: bool,
     remarks: &'a mut Remarks,
+    /// They are mended beyond what [`Mesh::new`] does.
+    pub repair: bool,
     /// Out flows.
     pub all: Vec<Mesh>,
     /// Triangles without an area in parts that held nothing else.
@@ -59,6 +61,7 @@ impl<'a> Meshes<'a> {
             file,
             several,
             remarks,
+            repair: false,
             all: Vec::new(),
             lost: 0,
             known: HashMap::new(),
@@ -178,7 +181,7 @@ impl<'a> Meshes<'a> {
                 self.remarks.leave_out("vertex colours");
             }
         }
-        match Mesh::new(raw) {
+        match Mesh::mended(raw, self.repair) {
             Ok(mesh) => {
                 self.all.push(mesh);
                 Ok(Some(self.all.len() - 1))

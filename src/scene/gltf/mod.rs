@@ -80,8 +80,8 @@ impl Remarks {
     }
 }
 
-/// Reads the `.gltf` or `.glb` at `path`.
-pub fn read(files: Files, path: &Path) -> Result<MeshFile> {
+/// Reads the `.gltf` or `.glb` at `path`; `repair`s the meshes beyond what [`super::Mesh::new`] does.
+pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     let wrong = |message: String| Error::input(path, 0, message);
     let bytes = files.read(path)?;
     let Container { json, binary } = Container::new(&bytes).map_err(wrong)?;
@@ -111,6 +111,7 @@ pub fn read(files: Files, path: &Path) -> Result<MeshFile> {
     leave_out(&document, &mut remarks);
     let accessors = Accessors::new(&buffers);
     let mut meshes = Meshes::new(&accessors, &coordinates, &file, document.meshes().len() > 1, &mut remarks);
+    meshes.repair = repair;
     let mut scene = SceneParts::default();
     for node in roots(&document) {
         scene.add(&node, &mut meshes).map_err(wrong)?;
