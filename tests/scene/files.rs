@@ -466,13 +466,15 @@ fn files_that_are_no_scene_are_refused() {
     folder.write("scene.txt", "");
     folder.write("latin.toml", b"# caf\n# \xe9\n");
     folder.write("model.glb", "glTF");
+    folder.write("model.fbx", "");
     folder.write("broken.toml", "[camera]\nposition = [0, 0\n\n[render]\n");
     fs::create_dir(folder.path("folder.toml")).unwrap();
     for (name, expected) in [
-        ("scene.txt", "scene.txt: is no scene of a known kind; known: .toml (scene), .obj (mesh)"),
+        ("scene.txt", "scene.txt: is no scene of a known kind; known: .toml (scene), .glb, .gltf, .obj (mesh)"),
         ("latin.toml", "latin.toml:2: is not UTF-8 text; save it as UTF-8"),
-        ("model.glb", "glTF is not read yet; convert to .obj"),
-        ("model.gltf", "glTF is not read yet; convert to .obj"),
+        ("model.glb", "model.glb: ends in the middle of a chunk; it was cut off"),
+        ("model.gltf", "model.gltf: cannot read"),
+        ("model.fbx", "model.fbx: is no scene of a known kind"),
         ("none.toml", "none.toml: cannot read"),
         ("folder.toml", "folder.toml: is a folder; name a file"),
         ("broken.toml", "broken.toml:4: "),
@@ -481,7 +483,11 @@ fn files_that_are_no_scene_are_refused() {
         assert!(error.to_string().contains(expected), "{error}");
         assert_eq!(error.exit_code(), 2);
     }
-    assert!(folder.fault("[[object]]\nmesh = \"model.glb\"").contains("glTF is not read yet"));
+    assert!(
+        folder
+            .fault("[[object]]\nmesh = \"model.fbx\"")
+            .contains("is no mesh of a known kind; known: .obj, .glb, .gltf")
+    );
     assert_eq!(folder.fault("a = 1\na = 2").split(':').next(), Some("2"));
 }
 
