@@ -449,12 +449,13 @@ fn what_is_not_supported_is_named_once() {
 #[test]
 fn faults_are_told_with_their_place() {
     let ball = || Model::of(&icosphere(1), None);
-    let with = |change: &dyn Fn(&mut Model)| {
+    type Change<'a> = &'a dyn Fn(&mut Model);
+    let with = |change: Change<'_>| {
         let mut model = ball();
         change(&mut model);
         refused(&model)
     };
-    let cases: [(&str, &dyn Fn(&mut Model)); 10] = [
+    let cases: [(&str, Change<'_>); 10] = [
         ("is compressed with KHR_draco_mesh_compression", &|model| {
             model.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
         }),
