@@ -171,12 +171,13 @@ pub struct Glass {
 /// The media that have names. Indices are relative to air, as catalogues give them.
 ///
 /// Sources. Schott's data sheets, with the coefficients of their dispersion formulas: N-BK7 (517642), N-SF11 (785257),
-/// SF10 (728285), N-BAF10 (670471), N-LAK22 (651559) and, for pyrex, BOROFLOAT 33, which has an Abbe number alone.
+/// SF10 (728285), N-BAF10 (670471), N-LAK22 (651559), for crown N-K5 (522595), for flint F2 (620364) and, for pyrex,
+/// BOROFLOAT 33, which has an Abbe number alone.
 /// Dispersion formulas, which the other indices and Abbe numbers come from: Malitson 1965 (fused silica), Malitson 1962
-/// (sapphire, ordinary ray), Malitson 1963 (fluorite), Peter 1923 (diamond), Sultanova et al. 2009 (acrylic). IAPWS
-/// R9-97 at 20 C, divided by the index of air (water), which is no formula of Sellmeier's and counts as an Abbe number.
-/// Warren & Brandt 2008 (ice), without dispersion.
-pub const GLASSES: [Glass; 13] = {
+/// (sapphire, ordinary ray), Malitson 1963 (fluorite), Peter 1923 (diamond), Sultanova et al. 2009 (acrylic,
+/// polycarbonate, polystyrene). IAPWS R9-97 at 20 C, divided by the index of air (water), which is no formula of
+/// Sellmeier's and counts as an Abbe number. Warren & Brandt 2008 (ice), without dispersion.
+pub const GLASSES: [Glass; 17] = {
     const fn still(name: &'static str, ior: f64) -> Glass {
         Glass { name, ior, abbe: None, dispersion: Dispersion::None }
     }
@@ -190,7 +191,21 @@ pub const GLASSES: [Glass; 13] = {
         glass("acrylic", 1.49062, 53.18, [1.1819, 0.0, 0.0], [0.011313, 0.0, 0.0]),
         glass("baf10", 1.67003, 47.11, [1.5851495, 0.143559385, 1.08521269], [0.00926681282, 0.0424489805, 105.613573]),
         glass("bk7", 1.5168, 64.17, [1.03961212, 0.231792344, 1.01046945], [0.00600069867, 0.0200179144, 103.560653]),
+        glass(
+            "crown",
+            1.52249,
+            59.48,
+            [1.08511833, 0.199562005, 0.930511663],
+            [0.00661099503, 0.024110866, 111.982777],
+        ),
         glass("diamond", 2.41749, 55.3, [0.3306, 4.3356, 0.0], [0.030625, 0.011236, 0.0]),
+        glass(
+            "flint",
+            1.62004,
+            36.37,
+            [1.34533359, 0.209073176, 0.937357162],
+            [0.00997743871, 0.0470450767, 111.886764],
+        ),
         glass("fluorite", 1.43385, 95.0, [0.5675888, 0.4710914, 3.8484723], [0.00252643, 0.01007833, 1200.555973]),
         glass(
             "fused-silica",
@@ -207,6 +222,8 @@ pub const GLASSES: [Glass; 13] = {
             [1.14229781, 0.535138441, 1.04088385],
             [0.00585778594, 0.0198546147, 100.834017],
         ),
+        glass("polycarbonate", 1.58476, 27.86, [1.4182, 0.0, 0.0], [0.021304, 0.0, 0.0]),
+        glass("polystyrene", 1.59163, 29.53, [1.4435, 0.0, 0.0], [0.020216, 0.0, 0.0]),
         by_abbe("pyrex", 1.4714, 65.41),
         glass("sapphire", 1.76817, 72.31, [1.4313493, 0.65054713, 5.3414021], [0.0052799261, 0.0142382647, 325.017834]),
         glass("sf10", 1.72825, 28.41, [1.61625977, 0.259229334, 1.07762317], [0.0127534559, 0.0581983954, 116.60768]),
@@ -247,7 +264,7 @@ mod tests {
             assert!((glass.abbe.unwrap() - abbe).abs() < 0.01, "{}: {abbe}", glass.name);
             formulas += 1;
         }
-        assert_eq!(formulas, 10);
+        assert_eq!(formulas, 14);
     }
 
     /// The helium d, hydrogen F and hydrogen C lines in nanometres.

@@ -290,7 +290,7 @@ fn glasses_are_named() {
     let folder = Folder::new();
     assert_eq!(dielectric(&folder.material("dielectric", "ior = \"water\"").unwrap(), 0).ior, 1.33299);
     let fault = folder.fault("[material.m]\nkind = \"dielectric\"\n\nior = \"bk9\"\n");
-    assert!(fault.starts_with("4: unknown glass \"bk9\"; known: acrylic, baf10, bk7, diamond"), "{fault}");
+    assert!(fault.starts_with("4: unknown glass \"bk9\"; known: acrylic, baf10, bk7, crown, diamond"), "{fault}");
 }
 
 #[test]
