@@ -290,8 +290,54 @@ fn materials_are_what_the_extensions_say() {
     let wanted =
         Opaque { base_color: DVec3::ZERO, emission: DVec3::new(0.5, 0.25, 0.125), specular: 0.0, ..Opaque::default() };
     assert_eq!(opaque(unlit), wanted);
+    // What has no light falling on it has none falling through.
+    let both = json!({ "extensions": { "KHR_materials_unlit": {}, "KHR_materials_transmission": { "transmissionFactor": 1 } } });
+    assert_eq!(opaque(both).emission, DVec3::ONE);
     let dull = json!({ "extensions": { "KHR_materials_specular": { "specularFactor": 0.5 }, "KHR_materials_ior": { "ior": 1.5 } } });
     assert!((opaque(dull).specular - 0.5).abs() < 1e-6);
+}
+
+/// Maps that are not looked at closely count by their means, so that a dark one does not shine and a mirror is not rough.
+#[test]
+fn maps_count_by_their_means() {
+    let mut model = Model::of(&icosphere(1), Some(json!({ "emissiveFactor": [1, 1, 1] })));
+    let mut png = std::io::Cursor::new(Vec::new());
+    // Of half of the pixels green is all and blue nothing, of the other half the reverse.
+    let halves = image::RgbImage::from_fn(2, 1, |x, _| image::Rgb(if x == 0 { [0, 255, 0] } else { [0, 0, 255] }));
+    halves.write_to(&mut png, image::ImageFormat::Png).expect("an image");
+    let view = model.view(&png.into_inner());
+    // Without the kind of it, which its bytes tell.
+    model.push("images", json!({ "bufferView": view }));
+    model.push("textures", json!({ "source": 0 }));
+    model.json["materials"][0]["emissiveTexture"] = json!({ "index": 0 });
+    model.json["materials"][0]["pbrMetallicRoughness"] = json!({ "metallicRoughnessTexture": { "index": 0 } });
+    let scene = loaded(&model);
+    let Surface::Opaque(opaque) = &scene.materials[0].surface else { panic!("{:?}", scene.materials) };
+    assert_eq!((opaque.metallic, opaque.roughness, opaque.emission), (0.5, 0.5, DVec3::new(0.0, 0.5, 0.5)));
+    let warnings = scene.warnings.join("\n");
+    assert!(warnings.contains("emissive textures (their mean is used)"), "{warnings}");
+}
+
+/// Names of one's own are no fault, and arrays may serve many primitives.
+#[test]
+fn what_programs_write_is_read() {
+    let ball = icosphere(3);
+    let mut model = Model::new();
+    let primitive = model.primitive(&with_uvs(ball.clone()), None);
+    let mut primitives = Vec::new();
+    for number in 0..60 {
+        let material = model.push("materials", json!({ "name": format!("m{number}") }));
+        let mut own = primitive.clone();
+        own["material"] = material.into();
+        own["attributes"]["_MINE"] = own["attributes"]["POSITION"].clone();
+        own["indices"] = model.accessor(&[0, 1, 2], U8, "SCALAR", 3).into();
+        primitives.push(own);
+    }
+    let mesh = model.mesh(&primitives);
+    model.node(json!({ "mesh": mesh }));
+    let scene = loaded(&model);
+    assert_eq!(scene.objects.len(), 60);
+    assert!(scene.meshes.iter().all(|mesh| mesh.positions.len() == 3), "each has what it needs");
 }
 
 /// Whatever arrays are made of, the mesh is the same.
@@ -455,7 +501,7 @@ fn faults_are_told_with_their_place() {
         change(&mut model);
         refused(&model)
     };
-    let cases: [(&str, Change<'_>); 10] = [
+    let cases: [(&str, Change<'_>); 12] = [
         ("is compressed with KHR_draco_mesh_compression", &|model| {
             model.json["extensionsRequired"] = json!(["KHR_draco_mesh_compression"]);
         }),
@@ -467,10 +513,19 @@ fn faults_are_told_with_their_place() {
             model.json["bufferViews"][0]["byteLength"] = json!(1_000_000);
         }),
         ("accessor 0 reaches beyond its buffer view", &|model| model.json["accessors"][0]["count"] = json!(1000)),
-        ("says that it has 4000000000 elements", &|model| {
+        ("accessor 0 has 4000000000 elements: more than the buffers hold", &|model| {
             model.json["accessors"][0]["count"] = json!(4_000_000_000_u64);
         }),
         ("an index is ", &|model| model.json["accessors"][0]["count"] = json!(3)),
+        ("camera 0 lacks what its type says", &|model| {
+            model.push(
+                "cameras",
+                json!({ "type": "perspective", "orthographic": { "xmag": 1, "ymag": 1, "zfar": 2, "znear": 1 } }),
+            );
+        }),
+        ("buffer view 0 reaches beyond its buffer", &|model| {
+            model.json["bufferViews"][0]["byteOffset"] = json!(u64::MAX);
+        }),
         ("shows no triangles", &|model| model.json["scenes"][0]["nodes"] = json!([])),
         ("meshes[0].primitives[0].indices", &|model| {
             model.json["meshes"][0]["primitives"][0]["indices"] = json!(99);

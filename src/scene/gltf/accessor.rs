@@ -1,12 +1,12 @@
 //! The numbers of accessors. In flow accessors and buffers, out flow arrays; what does not fit together is an error.
 
-use std::borrow::Cow;
 use std::cell::Cell;
+use std::rc::Rc;
 
 use gltf::accessor::sparse::IndexType;
 use gltf::accessor::{Accessor, DataType, Dimensions};
 
-use super::container::slice;
+use super::container::{Bytes, slice};
 
 /// How many bytes of numbers are read at most for each byte of the buffers: accessors may share bytes, not without end.
 const MOST_SHARED: usize = 16;
@@ -16,15 +16,17 @@ const MOST_ZEROS: usize = 1 << 22;
 
 /// The buffers of a file.
 pub struct Accessors<'a> {
-    buffers: &'a [Cow<'a, [u8]>],
+    buffers: &'a [Bytes<'a>],
     left: Cell<usize>,
     bytes: usize,
 }
 
 impl<'a> Accessors<'a> {
     /// Of these buffers.
-    pub fn new(buffers: &'a [Cow<'a, [u8]>]) -> Self {
-        let bytes: usize = buffers.iter().map(|bytes| bytes.len()).sum();
+    pub fn new(buffers: &'a [Bytes<'a>]) -> Self {
+        let is_new =
+            |&(number, bytes): &(usize, &Bytes<'_>)| !buffers[..number].iter().any(|one| Rc::ptr_eq(one, bytes));
+        let bytes: usize = buffers.iter().enumerate().filter(is_new).map(|(_, bytes)| bytes.len()).sum();
         Self { buffers, left: Cell::new(MOST_SHARED * bytes + MOST_ZEROS), bytes }
     }
 
@@ -59,7 +61,7 @@ impl<'a> Accessors<'a> {
         let (count, size) = (accessor.count(), accessor.size());
         let taken = count.checked_mul(size_of::<T>());
         let left = taken.and_then(|taken| self.left.get().checked_sub(taken)).ok_or_else(|| {
-            format!("accessor {} says that it has {count} elements, more than the buffers hold", accessor.index())
+            format!("accessor {} has {count} elements: more than the buffers hold, or the same bytes are read again and again", accessor.index())
         })?;
         self.left.set(left);
         let mut elements = match accessor.view() {

@@ -1,14 +1,18 @@
 //! What glTF files are made of: JSON, and buffers beside it, in it or behind it. In flow bytes and URIs, out flow bytes.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::sync::Arc;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
+use glam::DVec3;
 use gltf::buffer;
 use percent_encoding::percent_decode_str;
 
+use crate::image::{self, Stored};
 use crate::scene::files::Files;
 use crate::scene::mesh_file::ImageSource;
 use crate::{Error, Result};
@@ -22,7 +26,10 @@ pub struct Container<'a> {
 impl<'a> Container<'a> {
     /// The parts of a file that is a GLB or JSON; the error says what is wrong.
     pub fn new(bytes: &'a [u8]) -> Result<Self, String> {
-        let Some(rest) = bytes.strip_prefix(b"glTF") else { return Ok(Self { json: bytes, binary: None }) };
+        let Some(rest) = bytes.strip_prefix(b"glTF") else {
+            // Some programs begin text with a mark of its encoding.
+            return Ok(Self { json: bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes), binary: None });
+        };
         let (version, rest) = word(rest)?;
         if version != 2 {
             return Err(format!("is glTF of version {version}; only 2 is read, convert it"));
@@ -54,6 +61,9 @@ fn word(bytes: &[u8]) -> Result<(u32, &[u8]), String> {
     Ok((u32::from_le_bytes(*word), rest))
 }
 
+/// The bytes of a buffer, which may be those of another.
+pub type Bytes<'a> = Rc<Cow<'a, [u8]>>;
+
 /// Where bytes come from that a file names.
 pub struct Resources<'a> {
     pub files: Files,
@@ -64,24 +74,32 @@ pub struct Resources<'a> {
 
 impl Resources<'_> {
     /// The bytes of each buffer, at least as many as it says.
-    pub fn buffers<'a>(&mut self, document: &gltf::Document, binary: Option<&'a [u8]>) -> Result<Vec<Cow<'a, [u8]>>> {
-        let mut all = Vec::new();
+    pub fn buffers<'a>(&mut self, document: &gltf::Document, binary: Option<&'a [u8]>) -> Result<Vec<Bytes<'a>>> {
+        let mut all: Vec<Bytes<'_>> = Vec::new();
+        let mut of_files: HashMap<PathBuf, Bytes<'_>> = HashMap::new();
         for buffer in document.buffers() {
             let number = buffer.index();
             let bytes = match buffer.source() {
                 buffer::Source::Bin => match binary.filter(|_| number == 0) {
-                    Some(bytes) => Cow::Borrowed(bytes),
+                    Some(bytes) => Rc::new(Cow::Borrowed(bytes)),
                     None => return Err(self.wrong(format!("buffer {number} has no data; export the model again"))),
                 },
                 buffer::Source::Uri(uri) => match data_uri(uri) {
                     Some(bytes) => {
-                        Cow::Owned(bytes.map_err(|why| self.wrong(format!("buffer {number}: its data URI {why}")))?)
+                        let bytes = bytes.map_err(|why| self.wrong(format!("buffer {number}: its data URI {why}")))?;
+                        Rc::new(Cow::Owned(bytes))
                     }
                     None => {
-                        let path = self.beside(uri)?;
-                        let bytes = self.files.read(&path)?;
-                        self.read.push(path);
-                        bytes
+                        let path = self.beside(uri).map_err(|why| self.wrong(format!("buffer {number}: {why}")))?;
+                        match of_files.get(&path) {
+                            Some(bytes) => bytes.clone(),
+                            None => {
+                                let bytes = Rc::new(self.files.read(&path)?);
+                                of_files.insert(path.clone(), bytes.clone());
+                                self.read.push(path);
+                                bytes
+                            }
+                        }
                     }
                 },
             };
@@ -100,7 +118,7 @@ impl Resources<'_> {
         &self,
         document: &gltf::Document,
         number: usize,
-        buffers: &[Cow<'_, [u8]>],
+        buffers: &[Bytes<'_>],
     ) -> Result<ImageSource, String> {
         let embedded = |bytes: &[u8]| {
             let name = PathBuf::from(format!("{}#image{number}", self.path.display()));
@@ -115,16 +133,38 @@ impl Resources<'_> {
             }
             (None, Some(uri)) => match data_uri(uri) {
                 Some(bytes) => bytes.map(|bytes| embedded(&bytes)),
-                None => self.beside(uri).map(ImageSource::File).map_err(|error| error.to_string()),
+                None => self.beside(uri).map(ImageSource::File),
             },
             (None, None) => Err("it has neither bytes nor a file".into()),
         }
     }
 
+    /// The mean of each channel of an image, 8 bits being taken as sRGB or as linear.
+    pub fn mean(&self, source: &ImageSource, is_srgb: bool) -> Result<DVec3, String> {
+        let decoded = match source {
+            ImageSource::File(path) => self.files.read(path).and_then(|bytes| image::decode_stored(path, &bytes)),
+            ImageSource::Embedded { name, bytes } => image::decode_stored(name, bytes),
+        };
+        let wide = |pixel: [f32; 3]| DVec3::from_array(pixel.map(f64::from));
+        let (sum, count) = match decoded.map_err(|error| error.in_full())? {
+            Stored::Srgb { pixels, .. } if is_srgb => {
+                (pixels.iter().map(|pixel| wide(pixel.map(image::decode_srgb))).sum::<DVec3>(), pixels.len())
+            }
+            Stored::Srgb { pixels, .. } => {
+                (pixels.iter().map(|pixel| wide(pixel.map(f32::from)) / 255.0).sum(), pixels.len())
+            }
+            Stored::Linear(image) => (image.pixels.iter().map(|&pixel| wide(pixel)).sum(), image.pixels.len()),
+        };
+        Ok((sum / count.max(1) as f64).clamp(DVec3::ZERO, DVec3::ONE))
+    }
+
     /// The file that a relative URI names.
-    fn beside(&self, uri: &str) -> Result<PathBuf> {
+    fn beside(&self, uri: &str) -> Result<PathBuf, String> {
         if let Some((scheme, _)) = uri.split_once("://") {
-            return Err(self.wrong(format!("names {uri:?}; {scheme} is not read, save the file beside this one")));
+            return Err(format!("{uri:?}: {scheme} is not read, save the file beside this one"));
+        }
+        if uri.is_empty() {
+            return Err("its URI is empty; export the model again".into());
         }
         let name = percent_decode_str(uri).decode_utf8_lossy();
         Ok(self.path.parent().unwrap_or(Path::new("")).join(&*name))
@@ -136,7 +176,7 @@ impl Resources<'_> {
 }
 
 /// The bytes of a buffer view.
-pub fn slice<'a>(view: &buffer::View<'_>, buffers: &'a [Cow<'_, [u8]>]) -> Result<&'a [u8], String> {
+pub fn slice<'a>(view: &buffer::View<'_>, buffers: &'a [Bytes<'_>]) -> Result<&'a [u8], String> {
     let whole = buffers.get(view.buffer().index());
     let end = view.offset().checked_add(view.length());
     whole
@@ -147,7 +187,8 @@ pub fn slice<'a>(view: &buffer::View<'_>, buffers: &'a [Cow<'_, [u8]>]) -> Resul
 
 /// The bytes in a data URI, if it is one.
 fn data_uri(uri: &str) -> Option<Result<Vec<u8>, String>> {
-    let (header, data) = uri.strip_prefix("data:")?.split_once(',')?;
+    let rest = uri.strip_prefix("data:")?;
+    let Some((header, data)) = rest.split_once(',') else { return Some(Err("has no comma".into())) };
     Some(match header.ends_with(";base64") {
         true => STANDARD.decode(data.trim()).map_err(|error| format!("is no base 64: {error}")),
         false => Ok(percent_decode_str(data).collect()),

@@ -11,16 +11,16 @@
 //! | `emissiveFactor`, `emissiveStrength` | their product is the emission: a nit counts as 1 W/(m^2 sr) |
 //! | `unlit` | the base colour is sent out |
 
-use std::borrow::Cow;
+use std::collections::HashMap;
 
 use glam::{DMat2, DVec2, DVec3};
 use gltf::Document;
 use gltf::material::{AlphaMode, Material as Source};
-use gltf::texture::Info;
+use gltf::texture::{Info, Texture};
 
 use super::Remarks;
-use super::container::Resources;
-use crate::scene::mesh_file::Image;
+use super::container::{Bytes, Resources};
+use crate::scene::mesh_file::{Image, ImageSource};
 use crate::scene::{Dielectric, Dispersion, Material, Opaque, Surface};
 
 /// What KHR_materials_specular scales: the reflectance of an index of 1.5.
@@ -45,36 +45,65 @@ impl Default for Coordinates {
 
 /// Converts materials, one after the other.
 pub struct Converter<'a> {
-    pub document: &'a Document,
-    pub resources: &'a Resources<'a>,
-    pub buffers: &'a [Cow<'a, [u8]>],
+    document: &'a Document,
+    resources: &'a Resources<'a>,
+    buffers: &'a [Bytes<'a>],
+    remarks: &'a mut Remarks,
+    /// The images of all that were converted.
     pub images: Vec<Image>,
-    pub remarks: &'a mut Remarks,
+    /// Where in [`Converter::images`] an image is, multiplied by the factor of these bits.
+    numbers: HashMap<(usize, [u64; 3]), usize>,
+    sources: HashMap<usize, Result<ImageSource, String>>,
+    /// Of images the means of their channels, by what 8 bits stand for.
+    means: HashMap<(usize, bool), Result<DVec3, String>>,
 }
 
-impl Converter<'_> {
+impl<'a> Converter<'a> {
+    /// Of materials of `document`.
+    pub fn new(
+        document: &'a Document,
+        resources: &'a Resources<'a>,
+        buffers: &'a [Bytes<'a>],
+        remarks: &'a mut Remarks,
+    ) -> Self {
+        let (images, numbers, sources, means) = (Vec::new(), HashMap::new(), HashMap::new(), HashMap::new());
+        Self { document, resources, buffers, remarks, images, numbers, sources, means }
+    }
+
     /// The material, and how its image lies on meshes.
     pub fn convert(&mut self, source: &Source<'_>) -> (Material, Option<Coordinates>) {
         let index = source.index().unwrap_or(0);
         let name = source.name().map_or_else(|| format!("material {index}"), str::to_owned);
-        self.left_out(source);
         let pbr = source.pbr_metallic_roughness();
-        let metallic = self.within(&name, "metallicFactor", pbr.metallic_factor(), 0.0, 1.0);
-        let transmission = source.transmission().map_or(0.0, |transmission| transmission.transmission_factor());
-        let through = f64::from(transmission) * (1.0 - metallic);
+        if source.unlit() {
+            return (Material { surface: Surface::Opaque(self.unlit(source, &name)), name }, None);
+        }
+        self.left_out(source);
+        // Green is roughness, blue is metal.
+        let map = pbr.metallic_roughness_texture();
+        let map =
+            map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), false, "metallic-roughness textures", &name));
+        let metallic = map.z * self.within(&name, "metallicFactor", pbr.metallic_factor(), 0.0, 1.0);
+        let roughness = map.y * self.within(&name, "roughnessFactor", pbr.roughness_factor(), 0.0, 1.0);
+        let transmission = source.transmission().map_or(0.0, |transmission| {
+            let map = transmission.transmission_texture();
+            let map = map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), false, "transmission textures", &name));
+            map.x * f64::from(transmission.transmission_factor())
+        });
+        let through = transmission * (1.0 - metallic);
         if through > 0.0 && through < 1.0 {
             let shown = if through < 0.5 { "opaque" } else { "a dielectric" };
             self.remarks
                 .say(format!("material {name:?}: lets {through:.2} of the light through and is shown as {shown}"));
         }
         if through >= 0.5 {
-            return (Material { surface: Surface::Dielectric(self.dielectric(source, &name)), name }, None);
+            return (Material { surface: Surface::Dielectric(self.dielectric(source, &name, roughness)), name }, None);
         }
-        let (opaque, coordinates) = self.opaque(source, &name, metallic);
+        let (opaque, coordinates) = self.opaque(source, &name, metallic, roughness);
         (Material { surface: Surface::Opaque(opaque), name }, coordinates)
     }
 
-    fn dielectric(&mut self, source: &Source<'_>, name: &str) -> Dielectric {
+    fn dielectric(&mut self, source: &Source<'_>, name: &str, roughness: f64) -> Dielectric {
         let clear = Dielectric::default();
         let pbr = source.pbr_metallic_roughness();
         let volume = source.volume();
@@ -109,7 +138,7 @@ impl Converter<'_> {
             .map_or(0.0, |number| self.within(name, "dispersion", number as f32, 0.0, 1e9));
         Dielectric {
             ior,
-            roughness: self.within(name, "roughnessFactor", pbr.roughness_factor(), 0.0, 1.0),
+            roughness,
             dispersion: if dispersion > 0.0 { Dispersion::Khr(dispersion) } else { Dispersion::None },
             attenuation_color,
             attenuation_distance,
@@ -118,20 +147,32 @@ impl Converter<'_> {
         }
     }
 
-    fn opaque(&mut self, source: &Source<'_>, name: &str, metallic: f64) -> (Opaque, Option<Coordinates>) {
+    /// What sends its colour out, whatever shines on it.
+    fn unlit(&mut self, source: &Source<'_>, name: &str) -> Opaque {
+        let pbr = source.pbr_metallic_roughness();
+        let [r, g, b, _] = pbr.base_color_factor();
+        let map = pbr.base_color_texture();
+        let what = "base colour textures of unlit materials";
+        let map = map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), true, what, name));
+        let emission = map * self.color(name, "baseColorFactor", [r, g, b], 1.0);
+        Opaque { base_color: DVec3::ZERO, specular: 0.0, emission, ..Opaque::default() }
+    }
+
+    fn opaque(
+        &mut self,
+        source: &Source<'_>,
+        name: &str,
+        metallic: f64,
+        roughness: f64,
+    ) -> (Opaque, Option<Coordinates>) {
         let pbr = source.pbr_metallic_roughness();
         let [r, g, b, _] = pbr.base_color_factor();
         let base_color = self.color(name, "baseColorFactor", [r, g, b], 1.0);
+        let map = source.emissive_texture();
+        let map = map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), true, "emissive textures", name));
         let strength = source.emissive_strength().unwrap_or(1.0);
         let emissive = source.emissive_factor().map(|channel| channel * strength);
-        let emission = self.color(name, "emissiveFactor", emissive, 1e9);
-        if source.unlit() {
-            let unlit = Opaque { base_color: DVec3::ZERO, specular: 0.0, emission: base_color, ..Opaque::default() };
-            if pbr.base_color_texture().is_some() {
-                self.remarks.leave_out("the base colour textures of unlit materials");
-            }
-            return (unlit, None);
-        }
+        let emission = map * self.color(name, "emissiveFactor", emissive, 1e9);
         let mut specular = source.specular().map_or(1.0, |specular| f64::from(specular.specular_factor()));
         // 0 stands for an index without end, for materials that come from another workflow.
         if let Some(ior) = source.ior().filter(|ior| *ior > 0.0) {
@@ -143,7 +184,7 @@ impl Converter<'_> {
             base_color,
             base_color_texture: texture.flatten(),
             metallic,
-            roughness: self.within(name, "roughnessFactor", pbr.roughness_factor(), 0.0, 1.0),
+            roughness,
             specular: self.within(name, "the strength of the specular reflection", specular as f32, 0.0, 1.0),
             emission,
         };
@@ -164,16 +205,12 @@ impl Converter<'_> {
                 Coordinates { set, turn, offset: DVec2::from_array(transform.offset().map(f64::from)) }
             }
         };
-        let image = match info.texture().source() {
-            Some(image) => self.resources.image(self.document, image.index(), self.buffers),
-            None => Err("it is of a kind that is not read; known: PNG, JPEG".into()),
-        };
-        match image {
-            Ok(source) => {
-                let image = Image { source, factor };
-                let number = self.images.iter().position(|known| *known == image).unwrap_or_else(|| {
-                    self.images.push(image);
-                    self.images.len() - 1
+        match self.source(&info.texture()) {
+            Ok((number, source)) => {
+                let images = &mut self.images;
+                let number = *self.numbers.entry((number, factor.to_array().map(f64::to_bits))).or_insert_with(|| {
+                    images.push(Image { source, factor });
+                    images.len() - 1
                 });
                 (Some(number), coordinates)
             }
@@ -184,6 +221,28 @@ impl Converter<'_> {
         }
     }
 
+    /// The number of an image in the file, and where its bytes are.
+    fn source(&mut self, texture: &Texture<'_>) -> Result<(usize, ImageSource), String> {
+        let image = texture.source().ok_or("it is of a kind that is not read; known: PNG, JPEG")?;
+        let number = image.index();
+        let find = || self.resources.image(self.document, number, self.buffers);
+        self.sources.entry(number).or_insert_with(find).clone().map(|source| (number, source))
+    }
+
+    /// The mean of an image that is not looked at more closely, of 8 bits a channel as sRGB or linear.
+    fn mean(&mut self, texture: &Texture<'_>, is_srgb: bool, what: &str, name: &str) -> DVec3 {
+        self.remarks.leave_out(format!("{what} (their mean is used)"));
+        let (resources, source) = (self.resources, self.source(texture));
+        let mean = source.and_then(|(number, source)| {
+            let find = || resources.mean(&source, is_srgb);
+            self.means.entry((number, is_srgb)).or_insert_with(find).clone()
+        });
+        mean.unwrap_or_else(|why| {
+            self.remarks.say(format!("material {name:?}: an image cannot be read, and counts as white: {why}"));
+            DVec3::ONE
+        })
+    }
+
     /// Notes what a material says and does not get.
     fn left_out(&mut self, source: &Source<'_>) {
         let pbr = source.pbr_metallic_roughness();
@@ -192,15 +251,8 @@ impl Converter<'_> {
                 remarks.leave_out(name);
             }
         };
-        has_texture(pbr.metallic_roughness_texture().is_some(), "metallic-roughness textures", self.remarks);
         has_texture(source.normal_texture().is_some(), "normal maps", self.remarks);
         has_texture(source.occlusion_texture().is_some(), "occlusion textures", self.remarks);
-        has_texture(source.emissive_texture().is_some(), "emissive textures", self.remarks);
-        has_texture(
-            source.transmission().is_some_and(|transmission| transmission.transmission_texture().is_some()),
-            "transmission textures",
-            self.remarks,
-        );
         has_texture(
             source.volume().is_some_and(|volume| volume.thickness_texture().is_some()),
             "thickness textures (the mesh has its own thickness)",

@@ -42,6 +42,7 @@ pub struct Meshes<'a> {
     known: HashMap<Vec<Recipe>, Option<usize>>,
     parts: HashMap<usize, Vec<(usize, Option<usize>)>>,
     vectors: HashMap<usize, Rc<Vec<[f32; 3]>>>,
+    uvs: HashMap<usize, Rc<Vec<[f32; 2]>>>,
     indices_left: usize,
 }
 
@@ -67,6 +68,7 @@ impl<'a> Meshes<'a> {
             known: HashMap::new(),
             parts: HashMap::new(),
             vectors: HashMap::new(),
+            uvs: HashMap::new(),
             indices_left,
         }
     }
@@ -170,7 +172,7 @@ impl<'a> Meshes<'a> {
             if has_uvs {
                 match primitive.get(&Semantic::TexCoords(set)) {
                     Some(accessor) => {
-                        let uvs = self.accessors.vectors::<2>(&accessor)?;
+                        let uvs = self.uvs(&accessor)?;
                         same("texture coordinates", uvs.len())?;
                         raw.uvs.extend(used.of(&uvs).map(|uv| upward(uv, coordinates)));
                     }
@@ -192,6 +194,15 @@ impl<'a> Meshes<'a> {
             }
             Err(refusal) => Err(refusal.to_string()),
         }
+    }
+
+    fn uvs(&mut self, accessor: &Accessor<'_>) -> Result<Rc<Vec<[f32; 2]>>, String> {
+        if let Some(known) = self.uvs.get(&accessor.index()) {
+            return Ok(known.clone());
+        }
+        let read = Rc::new(self.accessors.vectors::<2>(accessor)?);
+        self.uvs.insert(accessor.index(), read.clone());
+        Ok(read)
     }
 
     fn vectors(&mut self, accessor: &Accessor<'_>) -> Result<Rc<Vec<[f32; 3]>>, String> {

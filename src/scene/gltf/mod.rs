@@ -9,7 +9,7 @@ mod container;
 mod material;
 mod mesh;
 
-use std::collections::{BTreeSet, HashMap};
+use std::collections::{BTreeSet, HashSet};
 use std::path::Path;
 
 use glam::{DAffine3, DMat4, DQuat, DVec3};
@@ -21,9 +21,10 @@ use gltf::scene::Transform;
 use gltf::{Document, Node, json};
 
 use super::files::Files;
+use super::mesh::FARTHEST;
 use super::mesh_file::{MeshFile, Part, shorten, worn};
 use super::table::SCALE;
-use super::{Camera, PointLight};
+use super::{Camera, Material, PointLight};
 use crate::{Error, Result};
 use accessor::Accessors;
 use container::{Container, Resources};
@@ -49,7 +50,7 @@ const KNOWN: [&str; 12] = [
 /// Extensions that hide the meshes of a file from those who do not know them.
 const COMPRESSED: [&str; 3] = ["KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_meshopt_compression"];
 
-/// Intensities in candela beyond this are told: they were meant as lumens of watts.
+/// Intensities in candela beyond this are told: lumens that stand for watts are 683 times as many.
 const BRIGHT: f32 = 1e4;
 
 /// What is said of a file.
@@ -96,15 +97,14 @@ pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     let mut resources = Resources { files, path, read: Vec::new() };
     let buffers = resources.buffers(&document, binary)?;
     let mut of_materials = Remarks::default();
-    let mut converter = Converter {
-        document: &document,
-        resources: &resources,
-        buffers: &buffers,
-        images: Vec::new(),
-        remarks: &mut of_materials,
+    let worn_here: HashSet<_> =
+        document.meshes().flat_map(|mesh| mesh.primitives()).filter_map(|one| one.material().index()).collect();
+    let mut converter = Converter::new(&document, &resources, &buffers, &mut of_materials);
+    let convert = |material: gltf::Material<'_>| match material.index().is_some_and(|own| worn_here.contains(&own)) {
+        true => converter.convert(&material),
+        false => (Material::clear_glass(), None),
     };
-    let (materials, coordinates): (Vec<_>, Vec<_>) =
-        document.materials().map(|material| converter.convert(&material)).unzip();
+    let (materials, coordinates): (Vec<_>, Vec<_>) = document.materials().map(convert).unzip();
     let images = converter.images;
 
     let mut remarks = Remarks::default();
@@ -121,11 +121,13 @@ pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
         return Err(wrong("shows no triangles; export meshes, and nodes that show them".into()));
     }
     if lost > 0 {
-        remarks.say(format!("{lost} degenerate triangles removed, and the parts that held nothing else"));
+        let what = if lost == 1 { "triangle" } else { "triangles" };
+        remarks.say(format!("{lost} degenerate {what} removed, and the parts that held nothing else"));
     }
     let SceneParts { mut parts, camera, lights, remarks: of_scene, flat, .. } = scene;
     if flat > 0 {
-        remarks.say(format!("{flat} nodes are scaled to nothing, or by more than 1e9; left out"));
+        let what = if flat == 1 { "node is" } else { "nodes are" };
+        remarks.say(format!("{flat} {what} scaled by less than 1e-9 or more than 1e9; left out"));
     }
     let materials = worn(&mut parts, materials);
     Ok(MeshFile {
@@ -158,6 +160,16 @@ fn check(root: &json::Root) -> Result<(), String> {
     for primitive in root.meshes.iter().flat_map(|mesh| &mesh.primitives) {
         if primitive.attributes.get(&positions).is_some_and(|accessor| accessor.value() >= root.accessors.len()) {
             return Err("positions are in an accessor that does not exist; the file is damaged, export it again".into());
+        }
+    }
+    for (number, camera) in root.cameras.iter().enumerate() {
+        let has_lens = match camera.type_ {
+            Checked::Valid(json::camera::Type::Perspective) => camera.perspective.is_some(),
+            Checked::Valid(json::camera::Type::Orthographic) => camera.orthographic.is_some(),
+            Checked::Invalid => true,
+        };
+        if !has_lens {
+            return Err(format!("camera {number} lacks what its type says that it has; export it again"));
         }
     }
     let mut first = None;
@@ -209,7 +221,7 @@ struct SceneParts {
     /// Nodes that are scaled to nothing.
     flat: usize,
     objects: usize,
-    seen: HashMap<usize, ()>,
+    seen: HashSet<usize>,
 }
 
 impl SceneParts {
@@ -217,7 +229,7 @@ impl SceneParts {
     fn add(&mut self, root: &Node<'_>, meshes: &mut Meshes<'_>) -> Result<(), String> {
         let mut open = vec![(root.clone(), DAffine3::IDENTITY)];
         while let Some((node, parent)) = open.pop() {
-            if self.seen.insert(node.index(), ()).is_some() {
+            if !self.seen.insert(node.index()) {
                 return Err(format!("node {} is below two others, or below itself; export it again", node.index()));
             }
             let transform = parent * transform(&node);
@@ -250,6 +262,10 @@ impl SceneParts {
             }
             Projection::Perspective(lens) => {
                 let position = transform.translation;
+                if !is_near(position) {
+                    self.remarks.say(format!("camera {}: is not within 1e9 m; left out", camera.index()));
+                    return;
+                }
                 let target = position + transform.transform_vector3(DVec3::NEG_Z).normalize_or_zero();
                 match Camera::new(position, target, transform.transform_vector3(DVec3::Y), lens.yfov().into()) {
                     Ok(camera) => self.camera = Some(camera),
@@ -266,10 +282,14 @@ impl SceneParts {
                 let intensity = light.intensity();
                 let color = DVec3::from_array(light.color().map(f64::from)) * f64::from(intensity);
                 let is_light = color.is_finite() && color.min_element() >= 0.0 && color.max_element() <= 1e9;
-                if !is_light || !transform.translation.is_finite() {
+                if !is_light || !is_near(transform.translation) {
+                    let wanted = "from 0 to 1e9, or its place not within 1e9 m";
                     self.remarks
-                        .say(format!("light {}: intensity {intensity} is not from 0 to 1e9; left out", light.index()));
+                        .say(format!("light {}: intensity {intensity} is not {wanted}; left out", light.index()));
                     return;
+                }
+                if light.range().is_some() {
+                    self.remarks.leave_out("ranges of lights");
                 }
                 if intensity > BRIGHT {
                     self.remarks.say(format!(
@@ -283,6 +303,11 @@ impl SceneParts {
             Kind::Spot { .. } => self.remarks.leave_out("spot lights"),
         }
     }
+}
+
+/// Whether a point is where scenes may have one.
+fn is_near(point: DVec3) -> bool {
+    point.is_finite() && point.abs().max_element() <= FARTHEST
 }
 
 fn transform(node: &Node<'_>) -> DAffine3 {
