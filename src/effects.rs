@@ -209,9 +209,7 @@ fn lights(scene: &Scene) -> impl Iterator<Item = Caller> + '_ {
 /// Bounding boxes that meet may hold bodies that meet, and a camera in one may be inside the body.
 fn overlaps(scene: &Scene) -> impl Iterator<Item = Caller> + '_ {
     // A pane has no inside to overlap with.
-    let is_body = |number: &usize| {
-        of_glass(&scene.materials[scene.objects[*number].material].surface).is_some_and(|d| !d.thin_walled)
-    };
+    let is_body = |number: &usize| scene.body(&scene.objects[*number]).is_some();
     let bodies: Vec<usize> = (0..scene.objects.len()).filter(is_body).collect();
     let boxes: Vec<_> = bodies.iter().map(|&number| scene.bounds_of(&scene.objects[number])).collect();
     let parts = |&number: &usize| scene.meshes[scene.objects[number].mesh].overlaps;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use glam::DVec3;
 
-use super::{Dielectric, Mesh, Object, Scene, Surface};
+use super::{Mesh, Object, Scene};
 
 /// Bodies that are asked for how many others are around their middle.
 const MOST_ASKED: usize = 4096;
@@ -60,12 +60,7 @@ impl Scene {
         let mut bodies: Vec<(i32, f64, usize)> = (0..self.objects.len())
             .filter_map(|number| {
                 let object = &self.objects[number];
-                match self.materials[object.material].surface {
-                    Surface::Dielectric(Dielectric { thin_walled: false, priority, .. }) => {
-                        Some((priority, volume(object), number))
-                    }
-                    _ => None,
-                }
+                self.body(object).map(|glass| (glass.priority, volume(object), number))
             })
             .collect();
         bodies.sort_by(|a, b| (a.0, b.1).partial_cmp(&(b.0, a.1)).unwrap_or(a.0.cmp(&b.0)).then(a.2.cmp(&b.2)));
@@ -78,7 +73,7 @@ impl Scene {
 
     /// How many bodies may overlap at the middle of one of them, by their bounding boxes.
     pub fn bodies_at_one_place(&self) -> usize {
-        let is_body = |object: &&Object| matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled);
+        let is_body = |object: &&Object| self.body(object).is_some();
         let boxes: Vec<_> = self.objects.iter().filter(is_body).map(|object| self.bounds_of(object)).collect();
         let around = |point| boxes.iter().filter(|other| other.contains(point)).count();
         // Of thousands of bodies some are enough to find out.
@@ -91,9 +86,7 @@ impl Scene {
     }
 
     fn camera_is_in(&self, object: &Object) -> bool {
-        matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled)
-            && self.meshes[object.mesh].faults.is_closed()
-            && !self.is_seen_from_outside(object)
+        self.body(object).is_some() && self.meshes[object.mesh].faults.is_closed() && !self.is_seen_from_outside(object)
     }
 }
 

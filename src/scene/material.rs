@@ -116,6 +116,16 @@ impl Default for Opaque {
     }
 }
 
+impl Surface {
+    /// The glass, if it is some that has an inside.
+    pub fn body(&self) -> Option<&Dielectric> {
+        match self {
+            Self::Dielectric(glass) if !glass.thin_walled => Some(glass),
+            _ => None,
+        }
+    }
+}
+
 impl Material {
     /// What an object wears that has no material of its own.
     pub fn clear_glass() -> Self {

@@ -223,6 +223,11 @@ impl Scene {
         }
     }
 
+    /// The glass of an object that has an inside.
+    pub fn body(&self, object: &Object) -> Option<&Dielectric> {
+        self.materials[object.material].surface.body()
+    }
+
     /// The box around `object` in the world.
     pub fn bounds_of(&self, object: &Object) -> Bounds {
         Bounds::around_positions(&self.meshes[object.mesh].positions, &object.transform)
@@ -239,8 +244,7 @@ impl Scene {
 fn faults_of_meshes(objects: &[Object], meshes: &[Arc<Mesh>], materials: &[Material]) -> Vec<String> {
     let mut bounds_medium = vec![false; meshes.len()];
     for object in objects {
-        let surface = &materials[object.material].surface;
-        bounds_medium[object.mesh] |= matches!(surface, Surface::Dielectric(glass) if !glass.thin_walled);
+        bounds_medium[object.mesh] |= materials[object.material].surface.body().is_some();
     }
     let mut warnings = Vec::new();
     for (mesh, bounds_medium) in meshes.iter().zip(bounds_medium) {

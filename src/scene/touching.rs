@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use super::walls::{Walls, lies_on, middle, normal};
-use super::{Bounds, Object, Scene, Surface};
+use super::{Bounds, Object, Scene};
 
 /// How far apart walls are that count as touching, in the size of the smaller body, and how parallel.
 pub const NEAR: f64 = 1e-5;
@@ -26,7 +26,7 @@ pub struct Touch {
 impl Scene {
     /// Bodies of glass whose walls lie on each other, of as many pairs as can be looked at.
     pub fn touching(&self) -> Vec<Touch> {
-        let is_body = |object: &Object| matches!(&self.materials[object.material].surface, Surface::Dielectric(glass) if !glass.thin_walled);
+        let is_body = |object: &Object| self.body(object).is_some();
         let bodies: Vec<_> = (0..self.objects.len()).filter(|&number| is_body(&self.objects[number])).collect();
         let bounds: Vec<_> = bodies.iter().map(|&number| self.bounds_of(&self.objects[number])).collect();
         let pairs = (0..bodies.len()).flat_map(|a| (a..bodies.len()).map(move |b| (a, b)));

@@ -20,7 +20,7 @@ pub use repair::{Mending, mend};
 
 use super::topology::weld;
 use super::walls::Walls;
-use super::{Dielectric, FaultSites, Mesh, MeshFaults, Object, Scene, Surface};
+use super::{Dielectric, FaultSites, Mesh, MeshFaults, Object, Scene};
 use shells::Shells;
 
 /// Bodies of glass beyond these sizes in metres are told: lengths are metres, and files in millimetres or kilometres
@@ -120,14 +120,6 @@ impl Scene {
             diagnosis
         };
         self.objects.iter().enumerate().map(examine).collect()
-    }
-
-    /// The glass of an object that has an inside.
-    fn body(&self, object: &Object) -> Option<&Dielectric> {
-        match &self.materials[object.material].surface {
-            Surface::Dielectric(glass) if !glass.thin_walled => Some(glass),
-            _ => None,
-        }
     }
 
     fn scale(&self, object: &Object, glass: &Dielectric) -> Option<Finding> {

@@ -2,6 +2,7 @@ use std::path::Path;
 
 use super::shape::Shape;
 use super::*;
+use crate::scene::Surface;
 use crate::scene::{Material, Overrides};
 
 /// Bodies of clear glass, each in a place of its own, seen from five metres away.

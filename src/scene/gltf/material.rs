@@ -16,7 +16,7 @@ use std::collections::HashMap;
 use glam::{DMat2, DVec2, DVec3};
 use gltf::Document;
 use gltf::material::{AlphaMode, Material as Source};
-use gltf::texture::{Info, Texture};
+use gltf::texture::{Info, Texture, WrappingMode};
 
 use super::Remarks;
 use super::container::{Bytes, Resources};
@@ -245,33 +245,28 @@ impl<'a> Converter<'a> {
 
     /// Notes what a material says and does not get.
     fn left_out(&mut self, source: &Source<'_>) {
-        let pbr = source.pbr_metallic_roughness();
-        let has_texture = |is: bool, name: &'static str, remarks: &mut Remarks| {
-            if is {
-                remarks.leave_out(name);
-            }
-        };
-        has_texture(source.normal_texture().is_some(), "normal maps", self.remarks);
-        has_texture(source.occlusion_texture().is_some(), "occlusion textures", self.remarks);
-        has_texture(
-            source.volume().is_some_and(|volume| volume.thickness_texture().is_some()),
-            "thickness textures (the mesh has its own thickness)",
-            self.remarks,
-        );
-        if let Some(specular) = source.specular() {
-            let textures = specular.specular_texture().is_some() || specular.specular_color_texture().is_some();
-            has_texture(textures, "specular textures", self.remarks);
-            has_texture(specular.specular_color_factor() != [1.0; 3], "specular colours", self.remarks);
-        }
-        has_texture(source.alpha_mode() != AlphaMode::Opaque, "alpha (mask and blend)", self.remarks);
-        if let Some(info) = pbr.base_color_texture() {
+        let thickness = source.volume().and_then(|volume| volume.thickness_texture());
+        let specular = source.specular();
+        let specular_maps = specular.as_ref().is_some_and(|specular| {
+            specular.specular_texture().is_some() || specular.specular_color_texture().is_some()
+        });
+        let tints = specular.is_some_and(|specular| specular.specular_color_factor() != [1.0; 3]);
+        let wraps = source.pbr_metallic_roughness().base_color_texture().is_some_and(|info| {
             let sampler = info.texture().sampler();
-            let repeat = gltf::texture::WrappingMode::Repeat;
-            has_texture(
-                sampler.wrap_s() != repeat || sampler.wrap_t() != repeat,
-                "wrapping of textures other than REPEAT",
-                self.remarks,
-            );
+            [sampler.wrap_s(), sampler.wrap_t()] != [WrappingMode::Repeat; 2]
+        });
+        for (is, what) in [
+            (source.normal_texture().is_some(), "normal maps"),
+            (source.occlusion_texture().is_some(), "occlusion textures"),
+            (thickness.is_some(), "thickness textures (the mesh has its own thickness)"),
+            (specular_maps, "specular textures"),
+            (tints, "specular colours"),
+            (source.alpha_mode() != AlphaMode::Opaque, "alpha (mask and blend)"),
+            (wraps, "wrapping of textures other than REPEAT"),
+        ] {
+            if is {
+                self.remarks.leave_out(what);
+            }
         }
     }
 

@@ -34,7 +34,7 @@ pub struct Meshes<'a> {
     several: bool,
     remarks: &'a mut Remarks,
     /// They are mended beyond what [`Mesh::new`] does.
-    pub repair: bool,
+    repair: bool,
     /// Out flows.
     pub all: Vec<Mesh>,
     /// Triangles without an area in parts that held nothing else.
@@ -53,6 +53,7 @@ impl<'a> Meshes<'a> {
         coordinates: &'a [Option<Coordinates>],
         file: &'a str,
         several: bool,
+        repair: bool,
         remarks: &'a mut Remarks,
     ) -> Self {
         let indices_left = MOST_SHARED * accessors.bytes() + (1 << 20);
@@ -62,7 +63,7 @@ impl<'a> Meshes<'a> {
             file,
             several,
             remarks,
-            repair: false,
+            repair,
             all: Vec::new(),
             lost: 0,
             known: HashMap::new(),

@@ -110,8 +110,7 @@ pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     let mut remarks = Remarks::default();
     leave_out(&document, &mut remarks);
     let accessors = Accessors::new(&buffers);
-    let mut meshes = Meshes::new(&accessors, &coordinates, &file, document.meshes().len() > 1, &mut remarks);
-    meshes.repair = repair;
+    let mut meshes = Meshes::new(&accessors, &coordinates, &file, document.meshes().len() > 1, repair, &mut remarks);
     let mut scene = SceneParts::default();
     for node in roots(&document) {
         scene.add(&node, &mut meshes).map_err(wrong)?;
