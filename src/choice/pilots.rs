@@ -1,28 +1,20 @@
-//! `--model auto`: the model and settings that keep a tolerance at the least cost, or that are best within a time.
-//!
-//! In flow a scene and a device, out flows what to ask of a render, and what to expect of it. Small pictures of each model, the pilots,
-//! tell how long a sample takes and how the error falls with their number. The error of a picture is the |x - r| / (r + 0.1) that 95 %
-//! of the pixels keep, each channel for itself.
-//!
-//! A model that simulates all that is wanted errs by its samples and by what it cuts off: pilots of different seeds, and of finer
-//! cut-offs, tell. What the other models make of the scene is held against `path`, the noise of which counts as their error: where it
-//! is larger than the tolerance, they are not chosen.
+//! The pilots: small pictures of each model, and what they tell. In flow a scene and a device, out flows a [`Law`] of each model that was
+//! tried.
 
 use std::f64::consts::SQRT_2;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use super::law::{FEW, Law, Spread};
+use super::{Candidate, Goal, no_model};
+use crate::Result;
 use crate::cost::mean;
 use crate::gpu::{DeviceKind, Gpu};
-use crate::options::{MOST_SAMPLES, Model, RenderArgs, Size};
+use crate::options::{Model, RenderArgs, Size};
 use crate::passes::{self, MOST_PIXELS, Rendered, Renderer};
 use crate::plan::{DEPTH_OF_TOLERANCE, Plan};
 use crate::scene::Scene;
-use crate::{Error, Result};
-
-/// What is tolerated where nothing is said: few see it.
-pub const TOLERANCE: f64 = 0.05;
 
 /// Pixels of a pilot, at most, on devices that are only busy with many, and at least.
 const PIXELS: f64 = 64.0 * 48.0;
@@ -30,8 +22,7 @@ const PIXELS_OF_GPUS: f64 = 256.0 * 192.0;
 const FEWEST_PIXELS: f64 = 16.0 * 12.0;
 
 /// Samples of the pilots; many those of `path` where more are quick.
-const FEW: u32 = 4;
-const MORE: u32 = 16;
+pub const MORE: u32 = 16;
 const MANY: u32 = 64;
 const STEP: u32 = MORE / FEW;
 const QUICK: Duration = Duration::from_millis(250);
@@ -44,9 +35,6 @@ const RUNGS: [(Option<f64>, u32); 4] =
 /// The power of the number of samples that errors fall with at most. That of edges under evenly spread points is 0.75, and footprints
 /// shrink with 0.5; with 0.75 a hollow ball had 93.9 % of its pixels within a tolerance of 0.01 (`benches/estimates.rs`).
 const EDGES: f64 = 0.65;
-
-/// How many times the samples of a pilot errors may be thought to fall with that power. Beyond, they fall with the square root.
-const REACH: f64 = 4.0;
 
 /// How many times the samples of a pilot a tolerance may take; beyond, another pilot is worth its time.
 const NEAR: f64 = 16.0;
@@ -65,226 +53,8 @@ const NEARLY_ALL: f64 = 0.99;
 const PILOT_SHARE: f64 = 0.2;
 const LONG: Duration = Duration::from_secs(1);
 
-/// Budgets below this leave no time for pilots.
-const SHORT: f64 = 5.0;
-
-/// What is asked of a picture.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Goal {
-    /// The error that 95 % of the pixels should keep.
-    pub tolerance: Option<f64>,
-    /// Seconds that it may take.
-    pub seconds: Option<f64>,
-}
-
-/// A model with settings, and what is expected of it.
-#[derive(Clone, Debug)]
-pub struct Candidate {
-    /// What to ask of a render.
-    pub args: RenderArgs,
-    /// What that amounts to.
-    pub model: Model,
-    /// Samples per pixel.
-    pub samples: u32,
-    /// Milliseconds of all samples: of the device, or where that has no clock of the host.
-    pub ms: f64,
-    /// The error that 95 % of the pixels are expected to keep.
-    pub error: f64,
-    /// How much the model leaves out or approximates.
-    pub lacks: usize,
-}
-
-impl Candidate {
-    /// The options that belong to the model, as text.
-    pub fn options(&self) -> String {
-        let RenderArgs { model, samples, max_depth, tolerance, time_budget, .. } = self.args;
-        RenderArgs { model, samples, max_depth, tolerance, time_budget, ..RenderArgs::default() }.to_string()
-    }
-}
-
-/// What was found.
-#[derive(Clone, Debug)]
-pub struct Choice {
-    /// What was asked for.
-    pub goal: Goal,
-    /// What is chosen.
-    pub best: Candidate,
-    /// What else could be done, the better ones first.
-    pub others: Vec<Candidate>,
-    /// Whether the best keeps what was asked for, as far as is known.
-    pub is_expected: bool,
-    /// Why nothing was measured, if so: errors and times are not known then, and not finite.
-    pub unmeasured: Option<&'static str>,
-    /// The time that it took to find out.
-    pub taken: Duration,
-}
-
-/// How error and time of a model go with the number of samples.
-#[derive(Clone, Copy, Debug)]
-struct Law {
-    /// What stays with any number of samples.
-    floor: f64,
-    /// What samples add to that, which were so many, and the power of their number that it falls with.
-    spread: f64,
-    tried: f64,
-    power: f64,
-    /// How much more precise than that samples should be.
-    margin: f64,
-    /// Milliseconds of a sample of the whole picture.
-    ms: f64,
-    /// How much the model leaves out or approximates.
-    lacks: usize,
-}
-
-impl Law {
-    fn error(&self, samples: u32) -> f64 {
-        let ratio = f64::from(samples) / self.tried;
-        let (near, far) = (ratio.min(REACH), ratio.max(REACH) / REACH);
-        self.floor.hypot(self.spread * near.powf(-self.power) / far.sqrt())
-    }
-
-    /// How many samples it takes to err no more than that, if any number does; no fewer than were tried.
-    fn samples(&self, error: f64) -> Option<u32> {
-        let left = (error * error - self.floor * self.floor).sqrt();
-        if left.is_nan() || left <= 0.0 {
-            return None;
-        }
-        let ratio = self.margin * self.spread / left;
-        let reached = REACH.powf(self.power);
-        let times = match ratio > reached {
-            true => REACH * (ratio / reached).powi(2),
-            false => ratio.powf(1.0 / self.power),
-        };
-        let samples = (self.tried * times).ceil().max(f64::from(FEW));
-        (samples <= f64::from(MOST_SAMPLES)).then_some(samples as u32)
-    }
-}
-
-/// Finds what to ask of a render of `scene` with `args`, whose model is to be chosen. The camera is framed already.
-pub fn choose(gpu: &Gpu, scene: &Scene, args: &RenderArgs) -> Result<Choice> {
-    let start = Instant::now();
-    let goal = Goal {
-        tolerance: args.tolerance.or(args.time_budget.is_none().then_some(TOLERANCE)),
-        seconds: args.time_budget,
-    };
-    let mut pilots = Pilots::new(gpu, scene, args, goal);
-    if goal.seconds.is_none_or(|seconds| seconds >= SHORT) {
-        pilots.all()?;
-    }
-    let taken = start.elapsed();
-    let (mut candidates, is_expected) = ranked(&pilots.laws, args, goal, taken);
-    if candidates.is_empty() {
-        let unmeasured = Some(if goal.seconds.is_some() { NO_TIME } else { NO_TRUTH });
-        return Ok(Choice {
-            goal,
-            best: pilots.unmeasured()?,
-            others: candidates,
-            is_expected: false,
-            unmeasured,
-            taken,
-        });
-    }
-    let best = candidates.remove(0);
-    Ok(Choice { goal, best, others: candidates, is_expected, unmeasured: None, taken })
-}
-
-/// What every model takes and how it errs, measured once: what is best for any goal follows.
-#[derive(Clone, Debug)]
-pub struct Measurements {
-    args: RenderArgs,
-    laws: Vec<(RenderArgs, Model, Law)>,
-}
-
-impl Measurements {
-    /// Of renders of `scene` with `args`, whose model counts for nothing and whose camera is framed already. It ends with
-    /// [`GpuError::Interrupted`](crate::gpu::GpuError::Interrupted) where `interrupt` is set.
-    pub fn new(gpu: &Gpu, scene: &Scene, args: &RenderArgs, interrupt: Arc<AtomicBool>) -> Result<Self> {
-        let args = RenderArgs { tolerance: None, time_budget: None, samples: None, model: None, ..args.clone() };
-        let mut pilots = Pilots::new(gpu, scene, &args, Goal { tolerance: None, seconds: None });
-        pilots.interrupt = Some(interrupt);
-        pilots.all()?;
-        let laws = pilots.laws;
-        Ok(Self { args, laws })
-    }
-
-    /// What each model has to offer for a goal, the best first. All have their samples given.
-    pub fn ranked(&self, goal: Goal) -> Vec<Candidate> {
-        let (mut all, _) = ranked(&self.laws, &self.args, goal, Duration::ZERO);
-        for one in &mut all {
-            one.args.samples = Some(one.samples);
-            one.args.tolerance = match one.model {
-                Model::Path => None,
-                _ => one.args.tolerance,
-            };
-        }
-        all
-    }
-
-    /// Milliseconds and errors of each model with 1, 2, 4, ... samples, as far as `most_ms`; where it has several settings, their depths
-    /// tell them apart.
-    pub fn curves(&self, most_ms: f64) -> Vec<(Model, Option<u32>, Vec<[f64; 2]>)> {
-        let several = |model: Model| self.laws.iter().filter(|(_, other, _)| *other == model).count() > 1;
-        let curve = |(args, model, law): &(RenderArgs, Model, Law)| {
-            let samples = (0..20).map(|power| 1_u32 << power);
-            let points = samples.map(|samples| [law.ms * f64::from(samples), law.error(samples)]);
-            let depth = args.max_depth.filter(|_| several(*model));
-            (*model, depth, points.take_while(|&[ms, error]| ms <= most_ms && error > 0.0).collect())
-        };
-        self.laws.iter().map(curve).collect()
-    }
-}
-
-/// Why nothing was measured.
-const NO_TIME: &str = "there is no time to try";
-const NO_TRUTH: &str = "nothing tells how far off a model is";
-
-/// `args`, whose model is to be chosen, with one that takes them.
-pub fn with_any_model(scene: &Scene, args: &RenderArgs) -> Result<RenderArgs> {
-    let with = |model: Model| RenderArgs { model: Some(model.into()), ..args.clone() };
-    let takes = |model: &Model| Plan::new(scene, &with(*model)).is_ok();
-    [Model::Path, Model::Tree, Model::Double, Model::Single].into_iter().find(takes).map(with).ok_or_else(no_model)
-}
-
-/// What each law comes to for what is asked, the best first, and whether that keeps it.
-fn ranked(laws: &[(RenderArgs, Model, Law)], args: &RenderArgs, goal: Goal, taken: Duration) -> (Vec<Candidate>, bool) {
-    let most = args.samples.unwrap_or(MOST_SAMPLES);
-    let left_ms = goal.seconds.map_or(f64::INFINITY, |seconds| (seconds - taken.as_secs_f64()).max(0.0) * 1e3);
-    let candidate = |(options, model, law): &(RenderArgs, Model, Law)| {
-        let affordable = (left_ms / law.ms).floor().clamp(1.0, f64::from(most)) as u32;
-        let needed = goal.tolerance.and_then(|tolerance| law.samples(tolerance));
-        // Where nothing is enough, as many as there may be of what comes closer with each, a few of what does not.
-        let closer = left_ms.is_finite() || goal.tolerance.is_some_and(|tolerance| law.floor < tolerance);
-        let mut samples = needed.unwrap_or(if closer { most } else { most.min(MORE) }).min(affordable);
-        if *model == Model::Path && args.samples.is_none() {
-            // It takes whole batches, and so many before it looks at a tolerance.
-            let least = if goal.tolerance.is_some() { passes::FEWEST_OF_TOLERANCE } else { passes::OPEN_BATCH };
-            let most = (affordable / passes::OPEN_BATCH * passes::OPEN_BATCH).max(passes::OPEN_BATCH);
-            samples = samples.next_multiple_of(passes::OPEN_BATCH).max(least).min(most);
-        }
-        // With a time budget as many as fit, and `path` stops by its own tolerance.
-        let open = *model == Model::Path || needed.is_none() && goal.seconds.is_some();
-        let args = RenderArgs { samples: if open { args.samples } else { Some(samples) }, ..options.clone() };
-        let (ms, error) = (law.ms * f64::from(samples), law.error(samples));
-        Candidate { args, model: *model, samples, ms, error, lacks: law.lacks }
-    };
-    let mut all: Vec<_> =
-        laws.iter().map(candidate).filter(|one| one.error.is_finite() && one.ms.is_finite()).collect();
-    let keeps = |one: &Candidate| {
-        let close = goal.tolerance.is_none_or(|tolerance| one.error <= tolerance * (1.0 + 1e-9));
-        close && one.ms <= left_ms
-    };
-    // Those that keep it by their time, then the others by their error; without a tolerance all by their error.
-    all.sort_by(|a, b| {
-        let both = goal.tolerance.is_some() && keeps(a) && keeps(b);
-        let by_error = a.error.total_cmp(&b.error).then(a.lacks.cmp(&b.lacks)).then(a.ms.total_cmp(&b.ms));
-        keeps(b).cmp(&keeps(a)).then(if both { a.ms.total_cmp(&b.ms) } else { by_error })
-    });
-    let is_expected = all.first().is_some_and(keeps);
-    (all, is_expected)
-}
-
 /// Small pictures, and what they tell.
-struct Pilots<'a> {
+pub struct Pilots<'a> {
     gpu: &'a Gpu,
     scene: &'a Scene,
     /// The options of the render but for the model, and what belongs to one.
@@ -294,15 +64,17 @@ struct Pilots<'a> {
     size: Size,
     /// How many times the pixels of a pilot the whole picture has.
     pixels: f64,
-    laws: Vec<(RenderArgs, Model, Law)>,
+    /// What was found.
+    pub laws: Vec<(RenderArgs, Model, Law)>,
     /// The mean of what `path` saw, if it sees all there is.
     truth: Option<Vec<[f32; 3]>>,
     /// Set to end it.
-    interrupt: Option<Arc<AtomicBool>>,
+    pub interrupt: Option<Arc<AtomicBool>>,
 }
 
 impl<'a> Pilots<'a> {
-    fn new(gpu: &'a Gpu, scene: &'a Scene, args: &'a RenderArgs, goal: Goal) -> Self {
+    /// None yet, of renders of `scene` with `args`.
+    pub fn new(gpu: &'a Gpu, scene: &'a Scene, args: &'a RenderArgs, goal: Goal) -> Self {
         let size = args.size.unwrap_or(Plan::SIZE);
         let small = pilot_size(gpu, size);
         let pixels = size.pixels() / small.pixels();
@@ -311,7 +83,7 @@ impl<'a> Pilots<'a> {
     }
 
     /// Of every model, as far as there is time.
-    fn all(&mut self) -> Result<()> {
+    pub fn all(&mut self) -> Result<()> {
         // Where `tree` needs no truth to be held against, it is the likelier choice.
         if self.is_tree_exact() {
             self.tree()?;
@@ -377,7 +149,7 @@ impl<'a> Pilots<'a> {
     }
 
     /// What to do without pilots: the first model that simulates all that is wanted, else the one that leaves out least.
-    fn unmeasured(&self) -> Result<Candidate> {
+    pub fn unmeasured(&self) -> Result<Candidate> {
         let options = |model| self.options(model, None, None);
         let plans = [Model::Tree, Model::Path, Model::Double, Model::Single].into_iter().filter_map(options);
         let plans: Vec<_> =
@@ -553,20 +325,6 @@ impl<'a> Pilots<'a> {
     }
 }
 
-/// The error of a number of samples, and the power of their number that it falls with.
-#[derive(Clone, Copy, Debug)]
-struct Spread {
-    error: f64,
-    samples: u32,
-    power: f64,
-}
-
-impl Spread {
-    fn law(self, floor: f64, margin: f64, ms: f64, lacks: usize) -> Law {
-        Law { floor, spread: self.error, tried: f64::from(self.samples), power: self.power, margin, ms, lacks }
-    }
-}
-
 /// The size of small pictures that tell of one of `size`.
 pub fn pilot_size(gpu: &Gpu, size: Size) -> Size {
     // Pixels of a picture as small are as wide, and err as much; of fewer, few tell little.
@@ -592,13 +350,6 @@ fn share(share: f64, errors: impl Iterator<Item = f64>) -> f64 {
     errors.sort_by(f64::total_cmp);
     let place = (errors.len() as f64 * share).ceil() as usize;
     errors.get(place.saturating_sub(1)).copied().unwrap_or(f64::NAN)
-}
-
-/// No model takes the options that are given.
-fn no_model() -> Error {
-    Error::Usage(
-        "--model auto: no model takes these options together; leave --aov or --checkpoint out, or name a model".into(),
-    )
 }
 
 /// The errors of `picture`, of each channel, where `truth` is right.
