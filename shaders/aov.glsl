@@ -21,7 +21,11 @@ void main()
     Material material = materials[instance.material];
     vec3 albedo = material.baseColor;
 #ifdef TEXTURED
-    albedo = BaseColor(material, Found(instanceIndex, inTriangle), hit.weights, mat2(0.0));
+    Found found = Found(instanceIndex, inTriangle);
+    Dressed dressed = DressAt(material, found, hit.weights, mat2(0.0));
+    if (dressed.presence < 0.5) discard;
+    albedo = dressed.material.baseColor;
+    if (NORMAL_MAPS) hit.normal = BumpedNormal(dressed.bump, hit.normal, found, hit.weights);
 #endif
     outNormalDepth = vec4(hit.normal, hit.t * length(ray));
     outAlbedoObject = vec4(albedo, instance.number);

@@ -15,5 +15,8 @@ layout(constant_id = 9) const bool NESTING = true;
 layout(constant_id = 10) const bool THIN_WALLED = true;
 layout(constant_id = 11) const bool OPAQUE = true;
 layout(constant_id = 12) const bool TEXTURES = true;
+layout(constant_id = 13) const bool NORMAL_MAPS = true;
+layout(constant_id = 14) const bool CUTOUTS = true;
+layout(constant_id = 15) const bool COATINGS = true;
 
 #endif

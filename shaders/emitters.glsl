@@ -56,11 +56,10 @@ EmitterSample SampleEmitter(float choice, vec2 u)
     return chosen;
 }
 
-// The density per steradian of choosing a point that is seen at `distance`, its surface at an angle of `cosine`.
-float EmitterPdf(vec3 emission, float distance, float cosine)
+// The density per steradian of choosing a point of a surface that `shines`, seen at `distance` and at an angle of `cosine`.
+float EmitterPdf(float shines, float distance, float cosine)
 {
-    float luminance = dot(emission, vec3(0.2126, 0.7152, 0.0722));
-    return luminance / emittedPower * distance * distance / max(abs(cosine), 1e-6); // seen on edge it is infinite
+    return shines / emittedPower * distance * distance / max(abs(cosine), 1e-6); // seen on edge it is infinite
 }
 
 #endif

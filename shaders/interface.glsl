@@ -3,14 +3,12 @@
 #ifndef INTERFACE_GLSL
 #define INTERFACE_GLSL
 
-#include "arrival.glsl"
 #include "compensation.glsl"
 #include "effects.glsl"
 #include "media.glsl"
 #include "opaque.glsl"
 #include "pane.glsl"
 #include "rough.glsl"
-#include "texture.glsl"
 
 // The density of a direction that could not have been another.
 const float NO_PDF = -1.0;
@@ -24,6 +22,7 @@ struct Met {
     float etaI;
     float etaT;
     float scale;       // what single bounces between facets lose, given back
+    vec3 tint;         // what light is multiplied by that goes through
     vec3 wi;
 };
 
@@ -42,7 +41,9 @@ Worth Evaluate(Met met, vec3 wo)
     bool reflected = wo.z > 0.0;
     if (reflected ? !REFLECTION : !TRANSMISSION) return Worth(vec3(0.0), rough.pdf);
     float ratio = reflected || met.isPane ? 1.0 : met.etaT / met.etaI;
-    return Worth(vec3(rough.value * met.scale * ratio * ratio), rough.pdf);
+    vec3 value = vec3(rough.value * met.scale * ratio * ratio);
+    if (COATINGS && !reflected) value *= met.tint;
+    return Worth(value, rough.pdf);
 }
 
 // A direction that a path goes on in.
@@ -72,7 +73,9 @@ Next SampleNext(Met met, vec2 u, float choice)
     bool reflected = rough.wo.z > 0.0;
     if (reflected ? !REFLECTION : !TRANSMISSION) rough.weight = 0.0;
     float ratio = reflected || met.isPane ? 1.0 : met.etaT / met.etaI;
-    return Next(rough.wo, vec3(rough.weight * met.scale * ratio * ratio), rough.pdf);
+    vec3 weight = vec3(rough.weight * met.scale * ratio * ratio);
+    if (COATINGS && !reflected) weight *= met.tint;
+    return Next(rough.wo, weight, rough.pdf);
 }
 
 // Whether the environment is looked for on that side of an interface: where another index than 1 is there only what is bent comes from it,
@@ -88,21 +91,19 @@ bool IsRough(Material material)
     return material.roughness > SMOOTH_ROUGHNESS;
 }
 
-Met MetAt(Material material, Arrival arrival, Crossing crossing, vec3 wi)
+Met MetAt(Material material, Crossing crossing, vec3 wi)
 {
     Met met;
     met.isOpaque = crossing.isOpaque;
     met.isPane = crossing.isPane;
     met.surface = OpaqueSurface(vec3(0.0), vec3(0.0), 0.0, 1.0);
-    if (met.isOpaque) {
-        vec3 color = BaseColor(material, arrival.found, arrival.weights, mat2(0.0));
-        met.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
-    }
+    if (met.isOpaque) met.surface = OpaqueSurfaceOf(material.baseColor, material.metallic, material.roughness, material.head, material.specular);
     met.alpha = material.roughness * material.roughness;
     met.etaI = crossing.etaI;
     met.etaT = crossing.etaT;
     met.wi = normalize(wi);
     met.scale = 1.0;
+    met.tint = material.baseColor;
     if (ENERGY_COMPENSATION && !met.isOpaque) {
         uint table = met.isPane ? material.albedoTable : RoughTable(material.albedoTables, met.etaI, met.etaT);
         met.scale = RoughCompensation(table, met.wi.z);

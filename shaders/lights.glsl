@@ -13,6 +13,7 @@
 #include "pixel.glsl"
 #include "records.glsl"
 #include "skylight.glsl"
+#include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
 
@@ -33,12 +34,23 @@ Lit LitAt(Record record)
     Found found = Found(record.instance, record.triangle);
     Material material = materials[instances[found.instance].material];
     lit.arrival = ArriveAt(found, record.origin, record.direction);
+    if (NORMAL_MAPS) {
+        vec3 bump = vec3(unpackHalf2x16(record.normal), 1.0);
+        lit.arrival.normal = BumpedNormal(bump, lit.arrival.normal, found, lit.arrival.weights);
+    }
     vec3 normal = lit.arrival.behind ? -lit.arrival.normal : lit.arrival.normal;
     lit.toWorld = BasisAround(NormalTowards(normal, -record.direction));
     lit.wi = normalize(-record.direction * lit.toWorld);
+    vec2 last = unpackUnorm2x16(record.color.y);
     vec3 color = material.baseColor;
-    if (TEXTURES && material.texture != 0) color = vec3(unpackUnorm2x16(record.color.x), unpackUnorm2x16(record.color.y).x);
-    lit.surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
+    if (TEXTURES && material.colorMap != 0) color = vec3(unpackUnorm2x16(record.color.x), last.x);
+    float metallic = material.metallic;
+    float roughness = material.roughness;
+    if (TEXTURES && material.finishMap != 0) {
+        metallic = last.y;
+        roughness = uintBitsToFloat(record.roughness);
+    }
+    lit.surface = OpaqueSurfaceOf(color, metallic, roughness, material.head, material.specular);
     return lit;
 }
 
@@ -140,6 +152,15 @@ void PassThrough(inout LightRay light, Material material, Arrival arrival)
     light.left = arrival.found;
 }
 
+// What a surface leaves of it that is not there everywhere.
+void PassBy(inout LightRay light, float presence, Arrival arrival)
+{
+    light.throughput *= (1.0 - presence) * Absorbed(light.at.medium, arrival.distance);
+    light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
+    light.origin = LeaveFrom(arrival, light.direction);
+    light.left = arrival.found;
+}
+
 void main()
 {
     ivec2 place = ivec2(gl_GlobalInvocationID.x + firstColumn, gl_GlobalInvocationID.y + firstRow);
@@ -182,8 +203,9 @@ void main()
             vec3 towards = light.direction;
             float lod = 0.0;
             if (onItsWay) {
-                Material material = materials[instances[found.instance].material];
-                isBlocked = material.kind == KIND_OPAQUE;
+                Dressed dressed = DressAt(materials[instances[found.instance].material], found, arrival.weights, mat2(0.0));
+                Material material = dressed.material;
+                isBlocked = dressed.presence == 1.0 && (material.kind == KIND_OPAQUE || (COATINGS && dressed.through == 0.0));
                 if (isBlocked) {
                     // What stands in the way of the environment sends its own light, and its colour of what the half of the environment
                     // before it sends, whatever else is there.
@@ -196,7 +218,9 @@ void main()
                     light.throughput *= Absorbed(light.at.medium, arrival.distance);
                     onItsWay = false;
                 } else {
-                    PassThrough(light, material, arrival);
+                    if (CUTOUTS && dressed.presence < 1.0) PassBy(light, dressed.presence, arrival);
+                    else PassThrough(light, material, arrival);
+                    if (COATINGS && dressed.presence == 1.0) light.throughput *= dressed.through * material.baseColor;
                     onItsWay = Largest(abs(light.throughput)) > LEAST_SHARE && ++passed <= MOST_PASSED;
                     isBlocked = !onItsWay;
                     share = vec3(0.0);

@@ -18,11 +18,12 @@ struct OpaqueSurface {
 // Below this alpha a facet distribution is a mirror.
 const float MIRROR_ALPHA = 1e-4;
 
-OpaqueSurface OpaqueSurfaceOf(vec3 baseColor, float metallic, float roughness, float specular)
+// `head` is what it reflects head on where it is no metal.
+OpaqueSurface OpaqueSurfaceOf(vec3 baseColor, float metallic, float roughness, float head, float specular)
 {
     OpaqueSurface surface;
     surface.diffuse = baseColor * (1.0 - metallic);
-    surface.head = mix(vec3(0.04 * specular), baseColor, metallic);
+    surface.head = mix(vec3(head * specular), baseColor, metallic);
     surface.grazing = mix(specular, 1.0, metallic);
     surface.alpha = roughness * roughness;
     return surface;

@@ -16,6 +16,7 @@
 #include "skylight.glsl"
 #include "sobol.glsl"
 #include "spectrum.glsl"
+#include "texture.glsl"
 #include "welford.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -133,10 +134,11 @@ bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pa
         light.reach = max(length(toLight), 1e-30);
         light.direction = toLight / light.reach;
         light.aim = chosen.found;
-        vec3 emission = materials[instances[chosen.found.instance].material].emission;
+        float shines = materials[instances[chosen.found.instance].material].shines;
         float cosine = dot(light.direction, chosen.faceNormal);
-        pdf = EmitterPdf(emission, light.reach, cosine) * chance;
-        radiance = emission * (abs(cosine) / (light.reach * light.reach * chosen.pdf * chance));
+        pdf = EmitterPdf(shines, light.reach, cosine) * chance;
+        // Times what it sends out there, once it is known.
+        radiance = vec3(abs(cosine) / (light.reach * light.reach * chosen.pdf * chance));
     } else {
         return false;
     }
@@ -185,10 +187,12 @@ void main()
     bool isColored = false;
     bool isBeyondGlass = false;
     bool startsSample = true;
+    uint turn = 0; // of the sample
 
     for (;;) {
         if (startsSample) {
             startsSample = false;
+            turn = 0;
             vec2 pixel = vec2(place) + Point(sequence, PAIR_PIXEL);
             path = Ray(vec3(0.0), normalize(CameraRay(pixel)), vec3(1.0), LARGEST_FLOAT, atCamera, NOWHERE, NOWHERE, 0);
             if (DISPERSION) wavelength = ChooseWavelength(Point(sequence, PAIR_WAVELENGTH).x);
@@ -212,18 +216,36 @@ void main()
         ++rays;
 
         Arrival arrival;
-        Material material = materials[0];
-        if (meets) arrival = ArriveAt(found, ray.origin, ray.direction);
+        Dressed dressed = Dressed(materials[0], 1.0, 1.0, vec3(0.0));
+        if (meets) {
+            arrival = ArriveAt(found, ray.origin, ray.direction);
+            dressed = DressAt(materials[instances[found.instance].material], found, arrival.weights, mat2(0.0));
+            if (NORMAL_MAPS) arrival.normal = BumpedNormal(dressed.bump, arrival.normal, found, arrival.weights);
+        }
+        Material material = dressed.material;
+        vec3 emitted = vec3(1.0);
+        if (isLight && OPAQUE && ray.aim != NOWHERE) {
+            bool arrives = meets && found == ray.aim;
+            emitted = arrives ? dressed.presence * material.emission : materials[instances[ray.aim.instance].material].emission;
+        }
         if (meets && isLight) {
             bool isPoint = ray.reach < LARGEST_FLOAT && ray.aim == NOWHERE;
             meets = arrival.distance < ray.reach && found != ray.aim && (SHADOWS || !isPoint);
         }
+        bool isThere = true;
+        if (meets && (CUTOUTS || COATINGS)) {
+            vec3 coins = vec3(Pcg3d(uvec3(sequence.seed, sequence.index, turn)) >> 8) / float(1 << 24);
+            isThere = isLight ? dressed.presence == 1.0 : coins.x < dressed.presence;
+            if (isLight && !isThere) ray.throughput *= 1.0 - dressed.presence;
+            if (coins.y >= dressed.through) material.kind = KIND_OPAQUE;
+        }
+        ++turn;
         Boundary boundary = Boundary(ray.at, ray.at);
         Crossing crossing = Crossing(boundary, 1.0, 1.0, false, false, false);
         bool disperses = false;
         if (meets) {
-            material = materials[instances[found.instance].material];
-            crossing = CrossingOf(found, material, arrival.behind, ray.at, wavelength.nanometres, disperses);
+            if (isThere) crossing = CrossingOf(found, material, arrival.behind, ray.at, wavelength.nanometres, disperses);
+            else crossing.passes = true;
             boundary = crossing.boundary;
             ray.throughput *= Absorbed(boundary.before.medium, arrival.distance);
         }
@@ -246,7 +268,7 @@ void main()
 
         if (isLight) {
             // Only what is not bent arrives.
-            if (!meets) sum += ray.throughput * (ray.reach < LARGEST_FLOAT ? Absorbed(ray.at.medium, ray.reach) : vec3(1.0));
+            if (!meets) sum += ray.throughput * emitted * (ray.reach < LARGEST_FLOAT ? Absorbed(ray.at.medium, ray.reach) : vec3(1.0));
             toLight = passes && !ends;
             light = ray;
         } else if (!meets) {
@@ -266,7 +288,7 @@ void main()
                 float weight = 1.0;
                 if (SeeksEmitters() && pdf > 0.0) {
                     float cosine = dot(ray.direction, arrival.faceNormal);
-                    weight = WeightOfSurface(pdf, EmitterPdf(material.emission, travelled + arrival.distance, cosine));
+                    weight = WeightOfSurface(pdf, EmitterPdf(material.shines, travelled + arrival.distance, cosine));
                 }
                 sum += weight * ray.throughput * material.emission / (crossing.etaI * crossing.etaI);
             }
@@ -291,7 +313,7 @@ void main()
             if (isOpaque || isRough) {
                 isClear = false;
                 mat3 toWorld = BasisAround(normal);
-                Met met = MetAt(material, arrival, crossing, wi * toWorld);
+                Met met = MetAt(material, crossing, wi * toWorld);
                 toLight = AskLight(met, toWorld, arrival, sequence, pair, ray, light);
                 if (toLight) {
                     bool through = dot(light.direction, faceNormal) < 0.0 && INTERIOR;
@@ -318,13 +340,15 @@ void main()
                 vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
                 vec3 wt = direction;
                 if (!crossing.isPane && !refraction.crossed.total) wt = DirectionAbove(normalize(refraction.wt), -faceNormal);
+                vec3 tint = COATINGS ? material.baseColor : vec3(1.0);
+                if (!reflected) weight = tint;
                 if (reflected ? !REFLECTION : !TRANSMISSION) weight = vec3(0.0);
                 float smaller = min(reflectance, 1.0 - reflectance) * share;
                 bool isWorthIt = depth == 1 ? smaller > 0.0 : BRANCHES && smaller > LEAST_SHARE && top < MOST_WAITING;
                 if (isClear && isWorthIt && REFLECTION && TRANSMISSION) {
                     reflected = true;
                     weight = vec3(reflectance);
-                    Ray transmitted = Ray(LeaveFrom(arrival, wt), wt, ray.throughput * (1.0 - reflectance), LARGEST_FLOAT, boundary.beyond, found,
+                    Ray transmitted = Ray(LeaveFrom(arrival, wt), wt, ray.throughput * tint * (1.0 - reflectance), LARGEST_FLOAT, boundary.beyond, found,
                         NOWHERE, 0);
                     waiting[top++] = Waiting(transmitted, depth, share * (1.0 - reflectance), isColored);
                     share *= reflectance;

@@ -43,6 +43,7 @@ void main()
     Put(frame.cameraIndex);
     Put(frame.cameraMedium);
     Put(frame.tolerance);
+    Put(frame.firstTangent);
     // The second of two, so that the size of the first counts too.
     Put(instances[1].objectToWorld);
     Put(instances[1].normalToWorld);
@@ -67,8 +68,19 @@ void main()
     Put(materials[1].specular);
     Put(materials[1].kind);
     Put(materials[1].albedoTable);
-    Put(materials[1].texture);
     Put(materials[1].albedoTables);
+    Put(materials[1].colorMap);
+    Put(materials[1].finishMap);
+    Put(materials[1].emissionMap);
+    Put(materials[1].transmissionMap);
+    Put(materials[1].normalMap);
+    Put(materials[1].alphaMap);
+    Put(materials[1].normalScale);
+    Put(materials[1].alphaCutoff);
+    Put(materials[1].alpha);
+    Put(materials[1].shines);
+    Put(materials[1].head);
+    Put(materials[1].transmission);
     Put(lights[1].position);
     Put(lights[1].intensity);
     Put(positions[1]);

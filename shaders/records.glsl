@@ -14,7 +14,10 @@ struct Record {
     uvec4 bodies;
     uint medium;
     uint line;        // wavelength
-    uvec2 color;      // of the surface, four numbers from 0 to 1 of 16 bits
+    uvec2 color;      // of the surface, red and green, blue and metal
+    uint roughness;
+    uint normal;      // what its map makes of it, in the frame of the texture's coordinates: two of 16 bits, divided by the third
+    uvec2 padding;
 };
 
 layout(std430, set = 0, binding = 18) buffer RecordBuffer {

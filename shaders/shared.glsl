@@ -28,7 +28,7 @@ struct Frame {
     float cameraIndex;         // of the medium around it
     uint cameraMedium;         // its material, from 1; 0: none
     float tolerance;           // throughput that a pixel may lose so
-    uint padding;
+    uint firstTangent;         // among the coordinates of texture.glsl
 };
 
 struct Instance {
@@ -52,7 +52,7 @@ const uint KIND_OPAQUE = 2;
 struct Material {
     vec3 absorption;           // per unit of length
     float refractionIndex;     // at 587.6 nm
-    vec3 baseColor;
+    vec3 baseColor;            // of a dielectric what light is multiplied by that goes through
     float roughness;
     vec3 emission;
     float metallic;
@@ -62,8 +62,20 @@ struct Material {
     float specular;
     uint kind;
     uint albedoTable;          // its first node in the tables of compensation.glsl
-    uint texture;              // from 1; 0: none
     uint albedoTables;         // of every pair of indices that meet at it; 0: none
+    uint colorMap;             // images, from 1, as in texture.glsl; 0: none. Multiplied with the base colour
+    uint finishMap;            // green with the roughness, blue with what is metal
+    uint emissionMap;
+    uint transmissionMap;      // red
+    uint normalMap;
+    uint alphaMap;
+    float normalScale;
+    float alphaCutoff;         // there from this alpha on; below 0: as often as alpha says
+    float alpha;
+    float shines;              // luminance of the mean of what it sends out
+    float head;                // what a dielectric reflects head on
+    float transmission;        // the share of a dielectric that lets light through, where it is no metal
+    uint padding;
 };
 
 struct Light {

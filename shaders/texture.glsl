@@ -15,9 +15,21 @@ mat3x2 CoordinatesOf(uvec3 vertices)
     return mat3x2(coordinates[vertices.x], coordinates[vertices.y], coordinates[vertices.z]);
 }
 
-// Of each texture its first word, width and height; then the texels, linear, two words of two half floats each. Behind each image are
-// its halves, down to a single texel.
+// Images as materials wear them, numbered from 1: of each its first word, width, height and what lies beyond it; from the coordinates of
+// a mesh, v downwards, to its own a matrix, then an offset. Then the texels of each image, linear, two words of two half floats each:
+// red and green, blue and alpha. Behind each image are its halves, down to a single texel.
 layout(std430, set = 0, binding = 13) readonly buffer TexelBuffer { uint texels[]; };
+
+const uint MAP_WORDS = 10;
+
+// What lies beyond an image, two bits a direction.
+const uint WRAP_REPEAT = 0;
+const uint WRAP_MIRROR = 1;
+const uint WRAP_CLAMP = 2;
+
+float MapNumber(uint map, uint word) { return uintBitsToFloat(texels[MAP_WORDS * (map - 1) + word]); }
+
+mat2 TurnOf(uint map) { return mat2(MapNumber(map, 4), MapNumber(map, 5), MapNumber(map, 6), MapNumber(map, 7)); }
 
 // A level of an image.
 struct Texels {
@@ -25,9 +37,9 @@ struct Texels {
     uvec2 size;
 };
 
-Texels TexelsOf(uint number, int level)
+Texels TexelsOf(uint map, int level)
 {
-    uint header = 3 * (number - 1);
+    uint header = MAP_WORDS * (map - 1);
     Texels image = Texels(texels[header], uvec2(texels[header + 1], texels[header + 2]));
     for (int i = 0; i < level; ++i) {
         image.first += 2 * image.size.x * image.size.y;
@@ -36,33 +48,51 @@ Texels TexelsOf(uint number, int level)
     return image;
 }
 
-vec3 FetchTexel(Texels image, ivec2 place)
+// A column or row that may be one beyond the image.
+int Wrapped(int place, int size, uint wrap)
 {
-    // The image repeats; a place is at most one image away.
-    ivec2 size = ivec2(image.size);
-    place += ivec2(place.x < 0 ? size.x : 0, place.y < 0 ? size.y : 0);
-    place -= ivec2(place.x >= size.x ? size.x : 0, place.y >= size.y ? size.y : 0);
-    uint word = image.first + 2 * uint(place.y * size.x + place.x);
-    return vec3(unpackHalf2x16(texels[word]), unpackHalf2x16(texels[word + 1]).x);
+    if (wrap == WRAP_CLAMP) return clamp(place, 0, size - 1);
+    if (wrap == WRAP_MIRROR) return place < 0 ? 0 : place >= size ? size - 1 : place;
+    return place + (place < 0 ? size : place >= size ? -size : 0);
 }
 
-// The colour at `uv`, bilinear.
-vec3 SampleTexels(Texels image, vec2 uv)
+// The same place within the image.
+float Within(float place, uint wrap)
 {
-    vec2 turned = vec2(uv.x, 1.0 - uv.y);
-    vec2 position = (turned - floor(turned)) * vec2(image.size) - 0.5;
+    if (wrap == WRAP_CLAMP) return clamp(place, 0.0, 1.0);
+    if (wrap == WRAP_MIRROR) return abs(place - 2.0 * floor(0.5 * place + 0.5));
+    return place - floor(place);
+}
+
+vec4 FetchTexel(Texels image, ivec2 place, uvec2 wrap)
+{
+    uint column = uint(Wrapped(place.x, int(image.size.x), wrap.x));
+    uint row = uint(Wrapped(place.y, int(image.size.y), wrap.y));
+    uint word = image.first + 2 * (row * image.size.x + column);
+    return vec4(unpackHalf2x16(texels[word]), unpackHalf2x16(texels[word + 1]));
+}
+
+// The texels at `at`, (0, 0) being the top left corner, bilinear.
+vec4 SampleTexels(Texels image, vec2 at, uvec2 wrap)
+{
+    vec2 position = vec2(Within(at.x, wrap.x), Within(at.y, wrap.y)) * vec2(image.size) - 0.5;
     vec2 corner = floor(position);
     vec2 weight = position - corner;
     ivec2 low = ivec2(corner);
-    vec3 top = mix(FetchTexel(image, low), FetchTexel(image, low + ivec2(1, 0)), weight.x);
-    vec3 bottom = mix(FetchTexel(image, low + ivec2(0, 1)), FetchTexel(image, low + ivec2(1, 1)), weight.x);
+    vec4 top = mix(FetchTexel(image, low, wrap), FetchTexel(image, low + ivec2(1, 0), wrap), weight.x);
+    vec4 bottom = mix(FetchTexel(image, low + ivec2(0, 1), wrap), FetchTexel(image, low + ivec2(1, 1), wrap), weight.x);
     return mix(top, bottom, weight.y);
 }
 
-// The mean colour of `texture`, counted from 1, over the parallelogram around `uv` whose sides are the columns of `sides`.
-vec3 SampleTexture(uint number, vec2 uv, mat2 sides)
+// The mean of what `map` has over the parallelogram around the coordinates `uv` of a mesh whose sides are the columns of `sides`.
+vec4 SampleMap(uint map, vec2 uv, mat2 sides)
 {
-    Texels image = TexelsOf(number, 0);
+    Texels image = TexelsOf(map, 0);
+    mat2 turn = TurnOf(map);
+    uint wraps = texels[MAP_WORDS * (map - 1) + 3];
+    uvec2 wrap = uvec2(wraps & 3, wraps >> 2);
+    vec2 at = turn * vec2(uv.x, 1.0 - uv.y) + vec2(MapNumber(map, 8), MapNumber(map, 9));
+    sides = turn * mat2(sides[0].x, -sides[0].y, sides[1].x, -sides[1].y);
     // Beyond a whole image nothing changes any more.
     sides = mat2(clamp(sides[0], -64.0, 64.0), clamp(sides[1], -64.0, 64.0));
     mat2 inTexels = mat2(sides[0] * vec2(image.size), sides[1] * vec2(image.size));
@@ -70,26 +100,112 @@ vec3 SampleTexture(uint number, vec2 uv, mat2 sides)
         float(findMSB(max(image.size.x, image.size.y))));
     int level = int(row.lod);
     float coarse = row.lod - float(level);
-    image = TexelsOf(number, level);
-    Texels next = TexelsOf(number, coarse > 0.0 ? level + 1 : level);
+    image = TexelsOf(map, level);
+    Texels next = TexelsOf(map, coarse > 0.0 ? level + 1 : level);
     vec2 axis = sides * row.axis;
-    vec3 sum = vec3(0.0);
+    vec4 sum = vec4(0.0);
     for (int i = 0; i < row.count; ++i) {
-        vec2 place = uv + PlaceInRow(row, i) * axis;
-        vec3 color = SampleTexels(image, place);
-        if (coarse > 0.0) color = mix(color, SampleTexels(next, place), coarse);
-        sum += color;
+        vec2 place = at + PlaceInRow(row, i) * axis;
+        vec4 value = SampleTexels(image, place, wrap);
+        if (coarse > 0.0) value = mix(value, SampleTexels(next, place, wrap), coarse);
+        sum += value;
     }
     return sum / float(row.count);
 }
 
-// The colour of an opaque surface at a point of the triangle that was found; `sides` of what the pixel sees of it in the texture's
-// coordinates.
-vec3 BaseColor(Material material, Found found, vec3 weights, mat2 sides)
+// A material as it is at a place.
+struct Dressed {
+    Material material;  // colours, roughness and metal are those of the place
+    float presence;     // how much of the surface is there, 0 to 1
+    float through;      // of a dielectric, the share that lets light through
+    vec3 bump;          // the normal in the frame of the texture's coordinates
+};
+
+// At a point of a triangle; `sides` of what the pixel sees of it in the mesh's coordinates.
+Dressed DressAt(Material material, Found found, vec3 weights, mat2 sides)
 {
-    if (!TEXTURES || material.texture == 0) return material.baseColor;
+    Dressed dressed = Dressed(material, 1.0, 1.0, vec3(0.0, 0.0, 1.0));
+    vec4 color = vec4(1.0);
+    vec4 finish = vec4(1.0);
+    vec4 emission = vec4(1.0);
+    vec4 transmission = vec4(1.0);
+    float alpha = 1.0;
+    if (TEXTURES || NORMAL_MAPS || CUTOUTS) {
+        uint normalMap = NORMAL_MAPS ? material.normalMap : 0;
+        uint maps[6] = uint[6](0, 0, 0, 0, normalMap, CUTOUTS ? material.alphaMap : 0);
+        if (TEXTURES) {
+            maps[0] = material.colorMap;
+            maps[1] = material.finishMap;
+            maps[2] = material.emissionMap;
+            maps[3] = material.transmissionMap;
+        }
+        // Alpha comes with the colour.
+        bool joined = maps[5] == maps[0];
+        if (joined) maps[5] = 0;
+        vec2 uv = CoordinatesOf(VerticesOf(found)) * weights;
+        for (int i = 0; i < 6; ++i) {
+            if (maps[i] == 0) continue;
+            vec4 value = SampleMap(maps[i], uv, sides);
+            if (i == 0) color = value;
+            if (i == 1) finish = value;
+            if (i == 2) emission = value;
+            if (i == 3) transmission = value;
+            if (i == 4) dressed.bump = 2.0 * value.xyz - 1.0;
+            if (i == 5) alpha = value.a;
+        }
+        if (joined) alpha = color.a;
+        if (normalMap != 0) {
+            // Along the mesh's coordinates, as long as along those of the image.
+            vec2 slope = vec2(dressed.bump.x, -dressed.bump.y) * material.normalScale;
+            mat2 turn = TurnOf(normalMap);
+            vec2 turned = vec2(turn[1].y * slope.x - turn[1].x * slope.y, turn[0].x * slope.y - turn[0].y * slope.x);
+            turned *= sign(turn[0].x * turn[1].y - turn[0].y * turn[1].x) * length(slope) / max(length(turned), 1e-30);
+            dressed.bump = vec3(turned.x, -turned.y, max(dressed.bump.z, 1e-3));
+        }
+    }
+    if (TEXTURES) {
+        dressed.material.baseColor *= color.rgb;
+        dressed.material.roughness *= finish.g;
+        dressed.material.metallic *= finish.b;
+        dressed.material.emission *= emission.rgb;
+    }
+    if (CUTOUTS) {
+        alpha *= material.alpha;
+        dressed.presence = material.alphaCutoff < 0.0 ? alpha : float(alpha >= material.alphaCutoff);
+    }
+    if (COATINGS && material.kind != KIND_OPAQUE) {
+        dressed.through = material.transmission * transmission.r * (1.0 - dressed.material.metallic);
+    }
+    return dressed;
+}
+
+// A number a vertex behind the coordinates: its tangent in the mesh's space, as an octahedron has it (Cigolle et al. 2014), 4 added to
+// the first where the coordinates are mirrored.
+vec4 FetchTangent(uint vertex)
+{
+    vec2 place = coordinates[frame.firstTangent + vertex];
+    float side = place.x > 2.0 ? -1.0 : 1.0;
+    if (place.x > 2.0) place.x -= 4.0;
+    vec3 tangent = vec3(place, 1.0 - abs(place.x) - abs(place.y));
+    if (tangent.z < 0.0) tangent.xy = (1.0 - abs(tangent.yx)) * vec2(tangent.x < 0.0 ? -1.0 : 1.0, tangent.y < 0.0 ? -1.0 : 1.0);
+    return vec4(normalize(tangent), side);
+}
+
+// The normal of a surface that has `normal` without its map.
+vec3 BumpedNormal(vec3 bump, vec3 normal, Found found, vec3 weights)
+{
+    if (bump.x == 0.0 && bump.y == 0.0) return normal;
     uvec3 vertices = VerticesOf(found);
-    return SampleTexture(material.texture, CoordinatesOf(vertices) * weights, sides);
+    vec4 first = FetchTangent(vertices.x);
+    vec3 mean = weights.x * first.xyz + weights.y * FetchTangent(vertices.y).xyz + weights.z * FetchTangent(vertices.z).xyz;
+    mat3 toWorld = mat3(instances[found.instance].objectToWorld);
+    vec3 tangent = toWorld * mean;
+    tangent -= dot(tangent, normal) * normal;
+    float size = length(tangent);
+    if (size < 1e-6 * length(toWorld[0])) return normal;
+    tangent /= size;
+    float side = determinant(toWorld) < 0.0 ? -first.w : first.w;
+    return normalize(bump.x * tangent + bump.y * side * cross(normal, tangent) + bump.z * normal);
 }
 
 #endif

@@ -49,7 +49,7 @@ struct Branch {
     Differentials differentials;
 };
 
-Branch Child(Branch parent, Arrival arrival, vec3 direction, Differentials differentials, float share, Whereabouts at)
+Branch Child(Branch parent, Arrival arrival, vec3 direction, Differentials differentials, vec3 share, Whereabouts at)
 {
     vec3 origin = LeaveFrom(arrival, direction);
     return Branch(origin, direction, parent.throughput * share, parent.depth + 1, at, arrival.found, differentials);
@@ -102,9 +102,9 @@ void Discard(inout Gathered gathered, inout Outlook outlook, vec3 throughput, ve
 // ---- opaque surfaces -----------------------------------------------------------------------------------------------------------
 
 // What a mirror-like surface mirrors, of each channel; 0 where it is none.
-vec3 MirroredShare(Material material, vec3 color, vec3 wi, vec3 normal)
+vec3 MirroredShare(Material material, vec3 wi, vec3 normal)
 {
-    OpaqueSurface surface = OpaqueSurfaceOf(color, material.metallic, material.roughness, material.specular);
+    OpaqueSurface surface = OpaqueSurfaceOf(material.baseColor, material.metallic, material.roughness, material.head, material.specular);
     return IsSpecular(surface) && IsMirror(surface) ? FacetReflectance(surface, dot(wi, normal)) : vec3(0.0);
 }
 
@@ -114,8 +114,8 @@ struct Chain {
     uint spare;
 };
 
-// Leaves it to lights.glsl what else an opaque surface does with the light that reaches it.
-void Leave(inout Chain chain, inout Gathered gathered, Found found, Branch branch, uint line, vec3 color)
+// Leaves it to lights.glsl what else an opaque surface, or the share of it that is opaque, does with the light that reaches it.
+void Leave(inout Chain chain, inout Gathered gathered, Found found, Branch branch, uint line, Dressed dressed, float share)
 {
     uint number = chain.spare;
     if (number != 0) {
@@ -123,13 +123,15 @@ void Leave(inout Chain chain, inout Gathered gathered, Found found, Branch branc
     } else {
         number = atomicAdd(recordCount, 1) + 1;
         if (number > recordCapacity) {
-            gathered.discarded += Largest(branch.throughput);
+            gathered.discarded += share * Largest(branch.throughput);
             return;
         }
     }
-    uvec2 packed = uvec2(packUnorm2x16(color.rg), packUnorm2x16(vec2(color.b, 0.0)));
-    records[number - 1] = Record(branch.origin, chain.head, branch.direction, found.instance, branch.throughput, found.triangle,
-        branch.at.bodies.ranks, branch.at.medium, line, packed);
+    vec3 color = dressed.material.baseColor;
+    uvec2 packed = uvec2(packUnorm2x16(color.rg), packUnorm2x16(vec2(color.b, dressed.material.metallic)));
+    uint normal = packHalf2x16(clamp(dressed.bump.xy / dressed.bump.z, -6e4, 6e4));
+    records[number - 1] = Record(branch.origin, chain.head, branch.direction, found.instance, share * branch.throughput, found.triangle,
+        branch.at.bodies.ranks, branch.at.medium, line, packed, floatBitsToUint(dressed.material.roughness), normal, uvec2(0));
     chain.head = number;
 }
 
@@ -219,25 +221,40 @@ void main()
             if (frame.environmentVisible != 0 || branch.depth > 0) LookTowards(outlook, branch.throughput, direction, branch.differentials.direction);
         } else {
             Arrival arrival = ArriveAt(found, branch.origin, direction);
-            Material material = materials[instances[found.instance].material];
+            Differentials before = branch.differentials;
+            Differentials arrived = before;
+            if (FOOTPRINTS) arrived = Transferred(before, direction, arrival);
+            mat2 sides = mat2(0.0);
+            if (FOOTPRINTS && (TEXTURES || NORMAL_MAPS || CUTOUTS)) {
+                mat3x2 corners = CoordinatesOf(VerticesOf(found));
+                sides = mat2(corners[1] - corners[0], corners[2] - corners[0]) * WeightDifferentials(arrival, arrived.position);
+            }
+            Dressed dressed = DressAt(materials[instances[found.instance].material], found, arrival.weights, sides);
+            Material material = dressed.material;
+            if (NORMAL_MAPS) arrival.normal = BumpedNormal(dressed.bump, arrival.normal, found, arrival.weights);
+            if (COATINGS && dressed.through == 0.0) material.kind = KIND_OPAQUE;
             float wavelength = DISPERSION ? spectrum[line].w : D_LINE;
             Crossing crossing = CrossingOf(found, material, arrival.behind, branch.at, wavelength, disperses);
             Boundary boundary = crossing.boundary;
             bool isOpaque = crossing.isOpaque;
             bool isPane = crossing.isPane;
+            if (CUTOUTS && dressed.presence < 0.5) {
+                isOpaque = false;
+                crossing.passes = true;
+                boundary = Boundary(branch.at, branch.at);
+            }
             bool passes = crossing.passes;
             branch.throughput *= Absorbed(boundary.before.medium, arrival.distance);
 
             vec3 wi = -direction;
             vec3 faceNormal = arrival.behind ? -arrival.faceNormal : arrival.faceNormal;
             vec3 normal = NormalTowards(arrival.behind ? -arrival.normal : arrival.normal, wi);
-            Differentials before = branch.differentials;
             mat2x3 normals = mat2x3(0.0);
             if (FOOTPRINTS) {
                 if (passes) {
                     before.position += arrival.distance * before.direction;
                 } else {
-                    before = Transferred(before, direction, arrival);
+                    before = arrived;
                     normals = NormalDifferentials(arrival, normal, before.position);
                 }
                 branch.differentials = before;
@@ -260,21 +277,15 @@ void main()
                 ++interfaces;
                 // Light is given as it is in the medium that the surface lies in.
                 gathered.radiance += branch.throughput * material.emission / (crossing.etaI * crossing.etaI);
-                mat2 sides = mat2(0.0);
-                if (TEXTURES && FOOTPRINTS) {
-                    mat3x2 corners = CoordinatesOf(VerticesOf(found));
-                    sides = mat2(corners[1] - corners[0], corners[2] - corners[0]) * WeightDifferentials(arrival, before.position);
-                }
-                vec3 color = BaseColor(material, found, arrival.weights, sides);
-                Leave(chain, gathered, found, branch, line, color);
-                branch.throughput *= MirroredShare(material, color, wi, normal);
+                Leave(chain, gathered, found, branch, line, dressed, 1.0);
+                branch.throughput *= MirroredShare(material, wi, normal);
                 if (Largest(branch.throughput) > 0.0) {
                     vec3 wr = DirectionAbove(normalize(2.0 * dot(wi, normal) * normal - wi), faceNormal);
                     Differentials reflected = before;
                     if (FOOTPRINTS) reflected = Reflected(before, direction, normal, normals);
                     goesOn = branch.depth < frame.maxDepth && Largest(branch.throughput) > cutoff;
                     if (!goesOn && branch.depth < frame.maxDepth) gathered.faint += Largest(branch.throughput);
-                    if (goesOn) branch = Child(branch, arrival, wr, reflected, 1.0, branch.at);
+                    if (goesOn) branch = Child(branch, arrival, wr, reflected, vec3(1.0), branch.at);
                     else Discard(gathered, outlook, branch.throughput, wr, reflected);
                 }
             } else {
@@ -300,11 +311,22 @@ void main()
                     }
                     if (!REFLECTION) reflectance = 0.0;
                     if (!TRANSMISSION) transmittance = 0.0;
+                    vec3 tint = vec3(1.0);
+                    if (COATINGS) {
+                        tint = dressed.through * material.baseColor;
+                        // Where it is painted the same interface lies above; one that is rough is left to its lights.
+                        if (OPAQUE && dressed.through < 1.0) {
+                            Leave(chain, gathered, found, branch, line, dressed, 1.0 - dressed.through);
+                            if (material.roughness * material.roughness > MIRROR_ALPHA) reflectance *= dressed.through;
+                        }
+                        transmittance *= Largest(tint);
+                        tint /= max(Largest(tint), 1e-30);
+                    }
                     float whole = Largest(branch.throughput);
                     if (!INTERIOR) {
                         // The environment is all that lies beyond.
                         LookTowards(outlook, branch.throughput * reflectance, wr, reflected.direction);
-                        LookTowards(outlook, branch.throughput * transmittance, wt, refracted.direction);
+                        LookTowards(outlook, branch.throughput * (transmittance * tint), wt, refracted.direction);
                     } else {
                         bool reflects = whole * reflectance > cutoff;
                         bool transmits = whole * transmittance > cutoff;
@@ -318,17 +340,17 @@ void main()
                         }
                         if (!transmits && transmittance > 0.0) {
                             gathered.faint += whole * transmittance;
-                            Discard(gathered, outlook, branch.throughput * transmittance, wt, refracted);
+                            Discard(gathered, outlook, branch.throughput * (transmittance * tint), wt, refracted);
                         }
                         bool goesReflected = reflects && (reflectedFirst || !transmits);
                         if (reflects && transmits) {
-                            if (goesReflected) waiting[top] = Child(branch, arrival, wt, refracted, transmittance, boundary.beyond);
-                            else waiting[top] = Child(branch, arrival, wr, reflected, reflectance, boundary.before);
+                            if (goesReflected) waiting[top] = Child(branch, arrival, wt, refracted, transmittance * tint, boundary.beyond);
+                            else waiting[top] = Child(branch, arrival, wr, reflected, vec3(reflectance), boundary.before);
                             ++top;
                         }
                         goesOn = reflects || transmits;
-                        if (goesReflected) branch = Child(branch, arrival, wr, reflected, reflectance, boundary.before);
-                        else branch = Child(branch, arrival, wt, refracted, transmittance, boundary.beyond);
+                        if (goesReflected) branch = Child(branch, arrival, wr, reflected, vec3(reflectance), boundary.before);
+                        else branch = Child(branch, arrival, wt, refracted, transmittance * tint, boundary.beyond);
                     }
                 }
             }

@@ -7,7 +7,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use crate::options::Model;
-use crate::scene::{Dielectric, Scene, Surface};
+use crate::scene::{Coating, Dielectric, Material, Scene, Surface};
 
 /// A row of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -39,6 +39,12 @@ pub enum Effect {
     Opaque,
     /// Images on surfaces
     Textures,
+    /// Images that bend the normals of surfaces
+    NormalMaps,
+    /// Surfaces that are not there everywhere
+    Cutouts,
+    /// Glass that is coloured or painted at its surface
+    Coatings,
 }
 
 /// The highest roughness that still counts as smooth: the original's default.
@@ -60,6 +66,8 @@ struct Row {
 enum Calls {
     /// A surface that an object wears, if this says why.
     Surface(fn(&Surface) -> Option<String>),
+    /// The same of a material.
+    Material(fn(&Material) -> Option<String>),
     /// A light that shines on something.
     Light,
     /// Bodies that overlap, or the camera in one.
@@ -67,8 +75,8 @@ enum Calls {
 }
 
 /// THE table. Detection is conservative: an effect that might show is called for.
-const TABLE: [Row; 13] = {
-    use Calls::{Light, Overlap, Surface};
+const TABLE: [Row; 16] = {
+    use Calls::{Light, Material, Overlap, Surface};
     use Effect::*;
     use Model::{Double, Path, Single, Tree};
     const TRACED: &[Model] = &[Tree, Path];
@@ -112,8 +120,11 @@ const TABLE: [Row; 13] = {
         ),
         row(Nesting, "nesting", TRACED, Overlap, "no bodies of glass overlap, and the camera is in none"),
         row(ThinWalled, "thin-walled", INSIDE, Surface(thin_walled), "no glass is thin-walled"),
-        row(Opaque, "opaque", TRACED, Surface(opaque), "no object is opaque"),
-        row(Textures, "textures", TRACED, Surface(textured), "no opaque object wears an image"),
+        row(Opaque, "opaque", TRACED, Surface(opaque), "no object is opaque, not even in part"),
+        row(Textures, "textures", TRACED, Material(textured), "no object wears an image"),
+        row(NormalMaps, "normal-maps", TRACED, Material(mapped), "no object wears a map of normals"),
+        row(Cutouts, "cutouts", TRACED, Material(cut_out), "all surfaces are there everywhere"),
+        row(Coatings, "coatings", TRACED, Surface(coated), "no glass is coloured or painted at its surface"),
     ]
 };
 
@@ -179,21 +190,73 @@ fn opaque(surface: &Surface) -> Option<String> {
             Some("lets nothing through, and shines".into())
         }
         Surface::Opaque(_) => Some("lets nothing through".into()),
-        Surface::Dielectric(_) => None,
+        Surface::Dielectric(glass) => {
+            let painted = |coating: &Coating| {
+                coating.transmission < 1.0 || coating.transmission_texture.is_some() || coating.metallic > 0.0
+            };
+            glass.coating.as_deref().filter(|coating| painted(coating)).map(|_| "lets nothing through in part".into())
+        }
     }
 }
 
-fn textured(surface: &Surface) -> Option<String> {
-    let is_textured = matches!(surface, Surface::Opaque(opaque) if opaque.base_color_texture.is_some());
-    is_textured.then(|| "the base colour is an image".into())
+/// Maps of normals are an effect of their own, and so is what alpha leaves out.
+fn textured(material: &Material) -> Option<String> {
+    let (color, metallic_roughness, other) = match &material.surface {
+        Surface::Opaque(opaque) => (
+            opaque.base_color_texture,
+            opaque.metallic_roughness_texture,
+            opaque.emission_texture.map(|_| "the emission is an image"),
+        ),
+        Surface::Dielectric(glass) => {
+            let coating = glass.coating.as_deref();
+            (
+                coating.and_then(|coating| coating.base_color_texture),
+                glass.metallic_roughness_texture,
+                coating.and_then(|coating| coating.transmission_texture).map(|_| "the transmission is an image"),
+            )
+        }
+    };
+    let color = color.map(|_| "the base colour is an image");
+    let metallic_roughness = metallic_roughness.map(|_| "roughness and metal are an image");
+    color.or(metallic_roughness).or(other).map(str::to_owned)
+}
+
+fn mapped(material: &Material) -> Option<String> {
+    let bends = material.normal_map.filter(|normal| normal.scale != 0.0);
+    bends.map(|normal| format!("an image bends its normals, with a strength of {}", normal.scale as f32))
+}
+
+fn cut_out(material: &Material) -> Option<String> {
+    let cutout = material.cutout.as_ref()?;
+    Some(match (cutout.map, cutout.cutoff) {
+        (Some(_), Some(cutoff)) => format!("an image leaves out what has an alpha below {}", cutoff as f32),
+        (Some(_), None) => "an image says how much of it is there".into(),
+        (None, _) => format!("its alpha is {}", cutout.alpha as f32),
+    })
+}
+
+fn coated(surface: &Surface) -> Option<String> {
+    let coating = of_glass(surface)?.coating.as_deref()?;
+    let [r, g, b] = coating.base_color.as_vec3().to_array();
+    Some(match coating {
+        Coating { transmission_texture: Some(_), .. } => "an image tells where it lets light through".into(),
+        Coating { base_color_texture: Some(_), .. } => "an image colours what goes through".into(),
+        Coating { transmission, .. } if *transmission < 1.0 => {
+            format!("lets {} of the light through", *transmission as f32)
+        }
+        Coating { metallic, .. } if *metallic > 0.0 => format!("{} of it is metal", *metallic as f32),
+        _ => format!("its surface colours white {r}, {g}, {b}"),
+    })
 }
 
 /// A material that no object wears calls for nothing. Reasons tell numbers as 32 bits hold them: files of meshes do.
-fn materials<'s>(scene: &'s Scene, why: fn(&Surface) -> Option<String>) -> impl Iterator<Item = Caller> + 's {
+fn materials<'s>(
+    scene: &'s Scene,
+    why: impl Fn(&Material) -> Option<String> + 's,
+) -> impl Iterator<Item = Caller> + 's {
     let worn: BTreeSet<usize> = scene.objects.iter().map(|object| object.material).collect();
-    worn.into_iter().filter_map(move |material| {
-        why(&scene.materials[material].surface).map(|why| Caller::Material { material, why })
-    })
+    worn.into_iter()
+        .filter_map(move |material| why(&scene.materials[material]).map(|why| Caller::Material { material, why }))
 }
 
 fn any_dielectric(scene: &Scene, test: impl Fn(&Dielectric) -> bool) -> bool {
@@ -247,6 +310,8 @@ impl Effect {
     pub fn approximated_by(self, model: Model, scene: &Scene) -> bool {
         match (model, self) {
             (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows) => true,
+            // A mirror lies over what is painted, and what blends is there or not.
+            (Model::Tree, Self::Coatings | Self::Cutouts) => true,
             (Model::Double, Self::Interior | Self::DirectLight) => true,
             (Model::Double, Self::Roughness) => any_dielectric(scene, |d| d.thin_walled && d.roughness > SMOOTH),
             _ => false,
@@ -256,7 +321,8 @@ impl Effect {
     /// What in `scene` may show this, found one by one.
     pub fn callers<'s>(self, scene: &'s Scene) -> Box<dyn Iterator<Item = Caller> + 's> {
         match self.row().calls {
-            Calls::Surface(why) => Box::new(materials(scene, why)),
+            Calls::Surface(why) => Box::new(materials(scene, move |material| why(&material.surface))),
+            Calls::Material(why) => Box::new(materials(scene, why)),
             Calls::Light => Box::new(lights(scene)),
             Calls::Overlap => Box::new(overlaps(scene)),
         }
@@ -440,7 +506,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Dispersion, Glass, Opaque, Overrides, PointLight};
+    use crate::scene::{Dispersion, Glass, Opaque, Overrides, PointLight, TextureMap};
 
     fn built_in() -> Scene {
         Scene::load(None, &Overrides::default()).expect("the built-in scene")
@@ -502,7 +568,7 @@ mod tests {
             (glass(|g| g.dispersion = Glass::named("bk7").expect("a glass").dispersion), "dispersion"),
             (glass(|g| g.thin_walled = true), "thin-walled"),
             (Surface::Opaque(Opaque::default()), "opaque"),
-            (Surface::Opaque(Opaque { base_color_texture: Some(0), ..Opaque::default() }), "textures"),
+            (Surface::Opaque(Opaque { base_color_texture: Some(TextureMap::of(0)), ..Opaque::default() }), "textures"),
         ] {
             scene.materials[0].surface = surface;
             assert!(calls(&scene).contains(&expected), "{expected}");

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
 use serde_json::{Value, json};
-use vitrum::scene::{Mesh, Overrides, Scene, Surface, Texels, Texture};
+use vitrum::scene::{Mesh, Overrides, Scene, Texels, Texture};
 
 /// The longest that one case may take.
 const SLOWEST: Duration = Duration::from_secs(2);
@@ -275,14 +275,12 @@ fn check(scene: &Scene) {
         assert!(mesh.triangles.iter().flatten().all(|&vertex| (vertex as usize) < mesh.positions.len()));
     }
     for material in &scene.materials {
-        if let Surface::Opaque(opaque) = &material.surface {
-            assert!(opaque.base_color_texture.is_none_or(|texture| texture < scene.textures.len()));
-        }
+        assert!(material.maps().all(|map| map.texture < scene.textures.len()));
     }
     for texture in &scene.textures {
         let Texture { width, height, texels, .. } = texture.as_ref();
         let count = match texels {
-            Texels::Srgb(texels) => texels.len(),
+            Texels::Srgb(texels) | Texels::Unorm(texels) => texels.len(),
             Texels::Linear(texels) => texels.len(),
         };
         assert_eq!(count, *width as usize * *height as usize);

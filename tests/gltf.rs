@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::fs;
 use std::path::Path;
 
-use glam::{DAffine3, DVec3};
+use glam::{DAffine3, DVec2, DVec3};
 use serde_json::{Value, json};
 
 use common::Validated;
@@ -20,8 +20,8 @@ use vitrum::options::{Model as Transport, RenderArgs, Size};
 use vitrum::passes::{Rendered, render};
 use vitrum::plan::Plan;
 use vitrum::scene::{
-    Dielectric, Dispersion, Environment, Mesh, Opaque, Overrides, Panorama, RawMesh, Scene, Surface, Surroundings,
-    Texels,
+    Coating, Cutout, Dielectric, Dispersion, Environment, Mesh, NormalMap, Opaque, Overrides, Panorama, RawMesh, Scene,
+    Surface, Surroundings, Texels, TextureMap, Wrap,
 };
 
 fn load(path: &Path) -> Scene {
@@ -297,9 +297,9 @@ fn materials_are_what_the_extensions_say() {
     assert!((opaque(dull).specular - 0.5).abs() < 1e-6);
 }
 
-/// Maps that are not looked at closely count by their means, so that a dark one does not shine and a mirror is not rough.
+/// Images stand where materials want them, and of one set of coordinates.
 #[test]
-fn maps_count_by_their_means() {
+fn maps_are_where_materials_have_them() {
     let mut model = Model::of(&icosphere(1), Some(json!({ "emissiveFactor": [1, 1, 1] })));
     let mut png = std::io::Cursor::new(Vec::new());
     // Of half of the pixels green is all and blue nothing, of the other half the reverse.
@@ -313,9 +313,54 @@ fn maps_count_by_their_means() {
     model.json["materials"][0]["pbrMetallicRoughness"] = json!({ "metallicRoughnessTexture": { "index": 0 } });
     let scene = loaded(&model);
     let Surface::Opaque(opaque) = &scene.materials[0].surface else { panic!("{:?}", scene.materials) };
-    assert_eq!((opaque.metallic, opaque.roughness, opaque.emission), (0.5, 0.5, DVec3::new(0.0, 0.5, 0.5)));
+    // As numbers and as colours, which are two textures.
+    assert_eq!(opaque.metallic_roughness_texture, Some(TextureMap::of(0)));
+    assert_eq!(opaque.emission_texture, Some(TextureMap::of(1)));
+    assert!(
+        matches!(scene.textures[0].texels, Texels::Unorm(_)) && matches!(scene.textures[1].texels, Texels::Srgb(_))
+    );
+    assert_eq!((opaque.metallic, opaque.roughness, opaque.emission), (1.0, 1.0, DVec3::ONE));
+
+    model.push("samplers", json!({ "wrapS": 33071, "wrapT": 33648 }));
+    model.push("textures", json!({ "source": 0, "sampler": 0 }));
+    model.json["materials"][0]["normalTexture"] = json!({ "index": 1, "scale": 0.5,
+        "extensions": { "KHR_texture_transform": { "offset": [0.25, 0.0] } } });
+    model.json["materials"][0]["alphaMode"] = json!("MASK");
+    model.json["materials"][0]["emissiveTexture"] = json!({ "index": 0, "texCoord": 1 });
+    let scene = loaded(&model);
+    let material = &scene.materials[0];
+    let Surface::Opaque(opaque) = &material.surface else { panic!("{material:?}") };
+    let map = TextureMap { wrap: [Wrap::Clamp, Wrap::Mirror], offset: DVec2::new(0.25, 0.0), ..TextureMap::of(0) };
+    assert_eq!(material.normal_map, Some(NormalMap { map, scale: 0.5 }));
+    // Without alpha there is nothing to leave out, and of the second set of coordinates nothing is read.
+    assert_eq!((material.cutout, opaque.emission_texture), (None, None));
     let warnings = scene.warnings.join("\n");
-    assert!(warnings.contains("emissive textures (their mean is used)"), "{warnings}");
+    assert!(warnings.contains("images on a second set of texture coordinates"), "{warnings}");
+
+    // Glass that is painted, and metal in places.
+    let mut glass = glass(json!({}));
+    glass["extensions"]["KHR_materials_transmission"] =
+        json!({ "transmissionFactor": 0.5, "transmissionTexture": { "index": 0 } });
+    glass["pbrMetallicRoughness"] =
+        json!({ "metallicRoughnessTexture": { "index": 0 }, "baseColorFactor": [1, 0.5, 0.25, 0.5] });
+    glass["alphaMode"] = json!("BLEND");
+    model.json["materials"][0] = glass;
+    let scene = loaded(&model);
+    let Surface::Dielectric(Dielectric { roughness, metallic_roughness_texture, coating, .. }) =
+        &scene.materials[0].surface
+    else {
+        panic!("{:?}", scene.materials)
+    };
+    assert_eq!((*roughness, *metallic_roughness_texture), (1.0, Some(TextureMap::of(0))));
+    let wanted = Coating {
+        base_color: DVec3::new(1.0, 0.5, 0.25),
+        transmission: 0.5,
+        transmission_texture: Some(TextureMap::of(0)),
+        metallic: 1.0,
+        ..Coating::default()
+    };
+    assert_eq!(coating.as_deref(), Some(&wanted));
+    assert_eq!(scene.materials[0].cutout, Some(Cutout { alpha: 0.5, map: None, cutoff: None }));
 }
 
 /// Names of one's own are no fault, and arrays may serve many primitives.
@@ -463,31 +508,33 @@ fn images_are_turned_as_they_should() {
     model.json["materials"][0]["pbrMetallicRoughness"] = json!({ "baseColorFactor": [0.5, 0.25, 1.0, 1.0],
         "baseColorTexture": { "index": 0, "extensions": { "KHR_texture_transform": transform } } });
     let scene = loaded(&model);
-    for ([u, v], [found_u, found_v]) in with_uvs(rectangle(2.0, 2.0)).uvs.into_iter().zip(scene.meshes[0].uvs.clone()) {
+    assert_eq!(scene.meshes[0].uvs, with_uvs(rectangle(2.0, 2.0)).uvs);
+    let Surface::Opaque(opaque) = &scene.materials[0].surface else { panic!("{:?}", scene.materials) };
+    assert_eq!(opaque.base_color, DVec3::new(0.5, 0.25, 1.0));
+    let map = opaque.base_color_texture.expect("an image");
+    for (u, v) in [(0.0, 0.0), (0.3, 0.9)] {
         // A quarter turn takes what lies to the right to above, where v is less.
-        let (x, y) = (2.0 * u, 3.0 * (1.0 - v));
-        let (wanted_u, wanted_v) = (0.25 + y, 1.0 - (0.5 - x));
-        assert!((found_u - wanted_u).abs() < 1e-6 && (found_v - wanted_v).abs() < 1e-6, "{u} {v}: {found_u} {found_v}");
+        let found = map.turn * DVec2::new(u, v) + map.offset;
+        let wanted = DVec2::new(0.25 + 3.0 * v, 0.5 - 2.0 * u);
+        assert!((found - wanted).length() < 1e-6, "{u} {v}: {found}");
     }
-    // The factor is in the image.
-    let Texels::Linear(texels) = &scene.textures[0].texels else { panic!("{:?}", scene.textures[0]) };
-    assert_eq!(texels[0].map(|x| x.to_f32()), [0.5, 0.25, 1.0, 1.0]);
 }
 
 #[test]
 fn what_is_not_supported_is_named_once() {
     let mut model = Model::of(
         &icosphere(1),
-        Some(json!({ "alphaMode": "BLEND",
+        Some(json!({ "occlusionTexture": { "index": 0 },
         "extensions": { "KHR_materials_clearcoat": { "clearcoatFactor": 1.0 } } })),
     );
+    model.push("textures", json!({}));
     model.json["extensionsUsed"] = json!(["KHR_materials_clearcoat", "KHR_materials_ior"]);
     model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "spot", "spot": {} }] } });
     for _ in 0..2 {
         model.node(json!({ "mesh": 0, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
     }
     let warnings = loaded(&model).warnings.join("\n");
-    for wanted in ["left out: KHR_materials_clearcoat\n", "left out: alpha (mask and blend)", "left out: spot lights"] {
+    for wanted in ["left out: KHR_materials_clearcoat\n", "left out: occlusion textures", "left out: spot lights"] {
         assert_eq!(format!("{warnings}\n").matches(wanted).count(), 1, "{wanted}: {warnings}");
     }
 }

@@ -19,8 +19,8 @@ use vitrum::options::{Model, RenderArgs, Size};
 use vitrum::passes::{Rendered, render};
 use vitrum::plan::Plan;
 use vitrum::scene::{
-    Dielectric, Dispersion, Environment, Opaque, Overrides, Panorama, PointLight, Scene, Surface, Surroundings, Texels,
-    Texture,
+    Coating, Cutout, Dielectric, Dispersion, Environment, NormalMap, Opaque, Overrides, Panorama, PointLight, Scene,
+    Surface, Surroundings, Texels, Texture, TextureMap,
 };
 
 /// What a generated scene has beside clear glass: each has it, for every set of effects makes shaders of its own, and those that
@@ -33,6 +33,8 @@ struct Kind {
     thin_walled: bool,
     opaque: bool,
     textured: bool,
+    /// Normals, and what is cut out and painted.
+    dressed: bool,
     lit: bool,
     nested: bool,
     /// The surroundings are of one colour.
@@ -46,12 +48,13 @@ const PLAIN: Kind = Kind {
     thin_walled: false,
     opaque: false,
     textured: false,
+    dressed: false,
     lit: false,
     nested: false,
     constant: false,
 };
 
-const KINDS: [Kind; 10] = [
+const KINDS: [Kind; 12] = [
     PLAIN,
     Kind { rough: true, ..PLAIN },
     Kind { absorbing: true, constant: true, ..PLAIN },
@@ -62,6 +65,8 @@ const KINDS: [Kind; 10] = [
     Kind { opaque: true, textured: true, rough: true, ..PLAIN },
     Kind { rough: true, absorbing: true, thin_walled: true, lit: true, ..PLAIN },
     Kind { absorbing: true, dispersing: true, nested: true, opaque: true, ..PLAIN },
+    Kind { dressed: true, ..PLAIN },
+    Kind { dressed: true, textured: true, rough: true, opaque: true, lit: true, ..PLAIN },
 ];
 
 /// Scenes of each kind.
@@ -146,7 +151,7 @@ impl Random {
         if kind.opaque {
             let surface = Opaque {
                 base_color: self.color(),
-                base_color_texture: kind.textured.then_some(0),
+                base_color_texture: kind.textured.then(|| TextureMap::of(0)),
                 metallic: self.one_of(&[0.0, 1.0]),
                 roughness: self.one_of(&[0.0, 0.3, 1.0]),
                 emission: if self.0.bool() { self.color() } else { DVec3::ZERO },
@@ -157,7 +162,7 @@ impl Random {
             part.mesh.uvs = part.mesh.positions.iter().map(|&[x, y, _]| [x, y]).collect();
             parts.push(part);
         }
-        let texel = |i: u32| if (i + i / 4).is_multiple_of(2) { [200, 30, 90, 255] } else { [20, 190, 40, 255] };
+        let texel = |i: u32| if (i + i / 4).is_multiple_of(2) { [200, 30, 190, 255] } else { [20, 190, 240, 100] };
         let texture = Texture {
             path: "checker.png".into(),
             width: 4,
@@ -168,7 +173,30 @@ impl Random {
             true => Surroundings::Color(self.color()),
             false => Surroundings::Image(self.panorama()),
         };
+        if kind.dressed {
+            for part in &mut parts {
+                part.mesh.uvs = part.mesh.positions.iter().map(|&[x, y, z]| [x + 0.3 * z, y - 0.2 * z]).collect();
+                let Surface::Dielectric(glass) = &mut part.surface else { continue };
+                if self.0.bool() {
+                    glass.coating = Some(Box::new(Coating {
+                        base_color: self.color(),
+                        transmission: self.one_of(&[0.0, 0.5, 1.0]),
+                        transmission_texture: (kind.textured && self.0.bool()).then(|| TextureMap::of(0)),
+                        ..Coating::default()
+                    }));
+                }
+            }
+        }
         let mut made = scene(parts);
+        if kind.dressed {
+            for material in &mut made.materials {
+                let scale = self.number(0.1, 1.0);
+                material.normal_map = self.0.bool().then(|| NormalMap { map: TextureMap::of(0), scale });
+                let cutoff = self.0.bool().then_some(0.5);
+                let map = self.0.bool().then(|| TextureMap::of(0));
+                material.cutout = self.0.bool().then(|| Cutout { alpha: 0.75, map, cutoff });
+            }
+        }
         made.environment = Environment {
             light,
             intensity: self.number(0.5, 2.0),

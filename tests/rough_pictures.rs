@@ -306,10 +306,10 @@ fn smooth_scenes_pay_nothing() {
     assert_eq!(Some(smooth), peak(0.01, "all"));
     assert_eq!(Some(smooth), peak(0.5, "auto,-roughness"));
     let mut mixed = ball(0.01, 1.5);
-    mixed.materials.push(vitrum::scene::Material {
-        name: "worn by nothing".into(),
-        surface: Surface::Dielectric(Dielectric { roughness: 0.5, ..Dielectric::default() }),
-    });
+    mixed.materials.push(vitrum::scene::Material::new(
+        "worn by nothing".into(),
+        Surface::Dielectric(Dielectric { roughness: 0.5, ..Dielectric::default() }),
+    ));
     let plan = vitrum::plan::Plan::new(&mixed, &sized(16, 16)).expect("a plan");
     assert!(!plan.effects.names().contains(&"roughness"));
 }

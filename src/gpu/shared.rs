@@ -59,7 +59,7 @@ pub struct Frame {
     pub camera_index: f32,
     pub camera_medium: u32,
     pub tolerance: f32,
-    pub padding: u32,
+    pub first_tangent: u32,
 }
 
 impl Frame {
@@ -104,8 +104,20 @@ pub struct MaterialRecord {
     pub specular: f32,
     pub kind: u32,
     pub albedo_table: u32,
-    pub texture: u32,
     pub albedo_tables: u32,
+    pub color_map: u32,
+    pub finish_map: u32,
+    pub emission_map: u32,
+    pub transmission_map: u32,
+    pub normal_map: u32,
+    pub alpha_map: u32,
+    pub normal_scale: f32,
+    pub alpha_cutoff: f32,
+    pub alpha: f32,
+    pub shines: f32,
+    pub head: f32,
+    pub transmission: f32,
+    pub padding: u32,
 }
 
 impl MaterialRecord {

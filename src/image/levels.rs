@@ -2,21 +2,21 @@
 
 /// The next level of a mip chain: half as wide and high, rounded down, and at least 1. `measure` says how much of the image lies above
 /// a height from 0 to 1, up to a constant.
-pub(crate) fn halved(
-    texels: &[[f32; 3]],
+pub(crate) fn halved<const CHANNELS: usize>(
+    texels: &[[f32; CHANNELS]],
     width: u32,
     height: u32,
     measure: impl Fn(f64) -> f64,
-) -> (u32, u32, Vec<[f32; 3]>) {
+) -> (u32, u32, Vec<[f32; CHANNELS]>) {
     let (half_width, half_height) = ((width / 2).max(1), (height / 2).max(1));
     let columns = shares(width, half_width, |edge| edge);
     let rows = shares(height, half_height, measure);
     let mean = |row: &[(u32, f64)], column: &[(u32, f64)]| {
-        let mut sum = [0.0; 3];
+        let mut sum = [0.0; CHANNELS];
         for &(y, across) in row {
             for &(x, along) in column {
                 let texel = texels[(y * width + x) as usize];
-                (0..3).for_each(|i| sum[i] += across * along * f64::from(texel[i]));
+                (0..CHANNELS).for_each(|i| sum[i] += across * along * f64::from(texel[i]));
             }
         }
         sum.map(|value| value as f32)

@@ -11,7 +11,10 @@ pub use self::exr::{decode_whole as decode_whole_exr, encode as encode_exr};
 pub(crate) use levels::halved;
 pub use output::{FolderLock, ImageFormat, LOCK, OutputFile, check_folder, make_folder};
 pub use png::encode as encode_png;
-pub use read::{KNOWN_FORMATS, LARGEST_SIDE, Stored, Unreadable, decode, decode_srgb, decode_stored};
+pub use read::{
+    KNOWN_FORMATS, LARGEST_SIDE, Numbers, Stored, Unreadable, decode, decode_numbers, decode_srgb, decode_stored,
+    from_srgb,
+};
 
 /// Scene-linear radiance and whatever else is known about each pixel; row 0 is the top row.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -42,6 +42,31 @@ pub enum Stored {
     Linear(FloatImage),
 }
 
+/// Red, green, blue and alpha, row by row from the top, as numbers of a file.
+#[derive(Clone, Debug)]
+pub enum Numbers {
+    /// 8 bits a channel.
+    Eight {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// 255 stands for 1.
+        pixels: Vec<[u8; 4]>,
+    },
+    /// 16 bits a channel.
+    Sixteen {
+        /// Columns.
+        width: u32,
+        /// Rows.
+        height: u32,
+        /// 65535 stands for 1.
+        pixels: Vec<[u16; 4]>,
+    },
+    /// Linear, without alpha.
+    Float(FloatImage),
+}
+
 impl Stored {
     /// The same pixels, linear.
     pub fn into_linear(self) -> FloatImage {
@@ -65,6 +90,21 @@ pub fn decode(path: &Path, bytes: &[u8]) -> Result<FloatImage> {
 
 /// As [`decode`], but images of 8 bits a channel are left as they are.
 pub fn decode_stored(path: &Path, bytes: &[u8]) -> Result<Stored> {
+    Ok(match decode_numbers(path, bytes)? {
+        Numbers::Eight { width, height, pixels } => {
+            Stored::Srgb { width, height, pixels: pixels.into_iter().map(|[r, g, b, _]| [r, g, b]).collect() }
+        }
+        Numbers::Sixteen { width, height, pixels } => {
+            let decode = |code: u16| from_srgb(f64::from(code) / 65535.0);
+            let pixels = pixels.into_iter().map(|[r, g, b, _]| [r, g, b].map(decode)).collect();
+            Stored::Linear(FloatImage { width, height, pixels, layers: Vec::new() })
+        }
+        Numbers::Float(image) => Stored::Linear(image),
+    })
+}
+
+/// The pixels of the file at `path` as it has them, encoded or not.
+pub fn decode_numbers(path: &Path, bytes: &[u8]) -> Result<Numbers> {
     let extension = path.extension().map(|extension| extension.to_string_lossy().to_ascii_lowercase());
     let kind = kind_of(bytes).or(match extension.as_deref() {
         Some("exr") => Some(Kind::Exr),
@@ -74,7 +114,7 @@ pub fn decode_stored(path: &Path, bytes: &[u8]) -> Result<Stored> {
         _ => None,
     });
     let decoded = match kind {
-        Some(Kind::Exr) => exr::decode(bytes).map(Stored::Linear),
+        Some(Kind::Exr) => exr::decode(bytes).map(Numbers::Float),
         Some(Kind::Other(format)) => decode_other(format, bytes),
         None => Err(Unreadable(format!("is no image of a known kind; known: {KNOWN_FORMATS}"))),
     };
@@ -122,7 +162,7 @@ pub fn check_size(width: usize, height: usize, bytes_per_pixel: usize, file: usi
     Ok(())
 }
 
-fn decode_other(format: Format, bytes: &[u8]) -> Result<Stored, Unreadable> {
+fn decode_other(format: Format, bytes: &[u8]) -> Result<Numbers, Unreadable> {
     let wrong = |error: image::ImageError| Unreadable(error.to_string());
     let decoder = ImageReader::with_format(Cursor::new(bytes), format).into_decoder().map_err(wrong)?;
     let (width, height) = decoder.dimensions();
@@ -135,16 +175,16 @@ fn decode_other(format: Format, bytes: &[u8]) -> Result<Stored, Unreadable> {
         | image::DynamicImage::ImageLumaA8(_)
         | image::DynamicImage::ImageRgb8(_)
         | image::DynamicImage::ImageRgba8(_) => {
-            let pixels = decoded.into_rgb8().into_raw().as_chunks().0.to_vec();
-            return Ok(Stored::Srgb { width, height, pixels });
+            let pixels = decoded.into_rgba8().into_raw().as_chunks().0.to_vec();
+            return Ok(Numbers::Eight { width, height, pixels });
         }
         other if linear => other.into_rgb32f().pixels().map(|pixel| pixel.0).collect(),
         other => {
-            let decode = |code: u16| from_srgb(f64::from(code) / 65535.0);
-            other.into_rgb16().pixels().map(|pixel| pixel.0.map(decode)).collect()
+            let pixels = other.into_rgba16().into_raw().as_chunks().0.to_vec();
+            return Ok(Numbers::Sixteen { width, height, pixels });
         }
     };
-    Ok(Stored::Linear(FloatImage { width, height, pixels, layers: Vec::new() }))
+    Ok(Numbers::Float(FloatImage { width, height, pixels, layers: Vec::new() }))
 }
 
 /// From 8 bits as sRGB to linear.
@@ -153,7 +193,7 @@ pub fn decode_srgb(code: u8) -> f32 {
 }
 
 /// IEC 61966-2-1, display value to linear.
-fn from_srgb(value: f64) -> f32 {
+pub fn from_srgb(value: f64) -> f32 {
     (if value <= 0.04045 { value / 12.92 } else { ((value + 0.055) / 1.055).powf(2.4) }) as f32
 }
 

@@ -2,6 +2,7 @@
 //! flow words for `shaders/emitters.glsl`.
 
 use super::geometry::{Geometry, Layout};
+use super::materials::mean_emission;
 use crate::optics::spectrum::luminance;
 use crate::scene::{Scene, Surface};
 
@@ -21,7 +22,7 @@ pub(super) fn table(scene: &Scene, layout: &Layout, geometry: &Geometry) -> Vec<
     for ((number, transform), &object) in (0..).zip(&geometry.transforms).zip(&geometry.objects) {
         let object = &scene.objects[object];
         let Surface::Opaque(opaque) = &scene.materials[object.material].surface else { continue };
-        let brightness = luminance(opaque.emission);
+        let brightness = luminance(mean_emission(scene, opaque));
         if brightness <= 0.0 {
             continue;
         }

@@ -152,7 +152,11 @@ impl Geometry {
                     clockwise: object_to_world.matrix3.determinant() < 0.0,
                     // What is nearest of such a body is a front, unless it cuts through itself inside out: leaving out the
                     // backs changes nothing but the time.
-                    shown: if scene.is_seen_from_outside(object) { Shown::Fronts } else { Shown::Both },
+                    shown: match scene.is_seen_from_outside(object) && scene.materials[object.material].cutout.is_none()
+                    {
+                        true => Shown::Fronts,
+                        false => Shown::Both,
+                    },
                 },
             });
             all.transforms.push(transform);

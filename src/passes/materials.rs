@@ -1,9 +1,10 @@
 //! What objects are made of, as the device has it. In flow materials and textures of a scene, out flow arrays for
 //! `shaders/shared.glsl`, `shaders/compensation.glsl` and `shaders/texture.glsl`.
 
+use std::collections::HashMap;
 use std::sync::Arc;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, DVec4, Vec3};
 use half::f16;
 
 use super::view::View;
@@ -13,9 +14,10 @@ use crate::image;
 use crate::optics::compensation::AlbedoTable;
 use crate::optics::medium::absorption;
 use crate::optics::rough::RoughInterface;
+use crate::optics::spectrum::luminance;
 use crate::options::Model;
 use crate::plan::Plan;
-use crate::scene::{Dielectric, Dispersion, Material, Opaque, Scene, Sellmeier, Surface, Texels, Texture};
+use crate::scene::{Dielectric, Dispersion, Material, Opaque, Scene, Sellmeier, Surface, Texture, TextureMap, Wrap};
 
 /// An index so high that an interface reflects everything.
 const MIRROR: f64 = 1e12;
@@ -70,19 +72,24 @@ fn indices(scene: &Scene, plan: &Plan) -> Vec<f64> {
 }
 
 /// Materials, and the tables of what rough ones lose.
-pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<MaterialRecord>, Vec<f32>) {
+pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View, maps: &Maps) -> (Vec<MaterialRecord>, Vec<f32>) {
+    let means = Means { scene, looks: plan.effects.contains(Effect::Textures) };
     let mut albedos = Albedos { values: vec![0.0], tables: Vec::new() };
     let others = indices(scene, plan);
     let record = |material: &Material| {
         let glass = match &material.surface {
             Surface::Dielectric(glass) => glass,
-            Surface::Opaque(opaque) => return opaque_record(scene, plan, opaque),
+            Surface::Opaque(opaque) => return opaque_record(scene, opaque, &means, maps, common(material, maps)),
         };
-        let &Dielectric { ior, roughness, .. } = glass;
+        let finish = means.of(glass.metallic_roughness_texture.as_ref());
+        let (ior, roughness) = (glass.ior, glass.roughness * finish.y);
+        let coating = glass.coating.as_deref().cloned().unwrap_or_default();
         let (mut albedo_table, mut albedo_tables) = (0, 0);
         // In other media than air facets of index 1 lose light too.
         let sees_media = matches!(plan.model, Model::Path | Model::Double);
         let loses = is_rough(material) || sees_media && roughness > SMOOTH;
+        // There is a table for each roughness, and an image has many.
+        let loses = loses && !(means.looks && glass.metallic_roughness_texture.is_some());
         if plan.effects.contains(Effect::EnergyCompensation) && loses {
             let alpha = roughness * roughness;
             let is_pane = glass.thin_walled && plan.effects.contains(Effect::ThinWalled);
@@ -105,15 +112,22 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View) -> (Vec<Materia
         MaterialRecord {
             absorption: Vec3::new(r, g, b),
             refraction_index: ior as f32,
-            base_color: Vec3::ONE,
+            base_color: (coating.base_color * means.of(coating.base_color_texture.as_ref()).truncate()).as_vec3(),
             roughness: roughness as f32,
+            metallic: (coating.metallic * finish.z) as f32,
+            transmission: (coating.transmission * means.of(coating.transmission_texture.as_ref()).x) as f32,
+            specular: 1.0,
+            head: head(ior),
+            color_map: maps.number(coating.base_color_texture.as_ref()),
+            finish_map: maps.number(glass.metallic_roughness_texture.as_ref()),
+            transmission_map: maps.number(coating.transmission_texture.as_ref()),
             dispersion: dispersion(glass),
             sellmeier_strengths: formula.strengths.map(|x| x as f32).into(),
             sellmeier_resonances: formula.resonances.map(|x| x as f32).into(),
             kind: if glass.thin_walled { MaterialRecord::PANE } else { MaterialRecord::DIELECTRIC },
             albedo_table,
             albedo_tables,
-            ..MaterialRecord::default()
+            ..common(material, maps)
         }
     };
     let records = scene.materials.iter().map(record).collect();
@@ -130,56 +144,151 @@ fn dispersion(glass: &Dielectric) -> f32 {
     }
 }
 
-fn opaque_record(scene: &Scene, plan: &Plan, opaque: &Opaque) -> MaterialRecord {
-    // Of an image its mean, for those who do not look closer.
-    let texture = opaque.base_color_texture.filter(|_| plan.effects.contains(Effect::Opaque));
-    let base_color = texture.map_or(opaque.base_color, |texture| mean(&scene.textures[texture]));
+/// Images as materials wear them, each once, as far as a plan looks at them.
+#[derive(Debug, Default, PartialEq)]
+pub(super) struct Maps {
+    pub(super) all: Vec<TextureMap>,
+    numbers: HashMap<Key, u32>,
+}
+
+/// The bits of a map.
+type Key = (usize, [u64; 4], [u64; 2], [Wrap; 2]);
+
+impl Maps {
+    pub(super) fn new(scene: &Scene, plan: &Plan) -> Self {
+        let mut maps = Self::default();
+        if [Effect::Textures, Effect::NormalMaps, Effect::Cutouts].iter().any(|&effect| plan.effects.contains(effect)) {
+            for &map in scene.materials.iter().flat_map(Material::maps) {
+                let next = maps.all.len() as u32 + 1;
+                if *maps.numbers.entry(key(&map)).or_insert(next) == next {
+                    maps.all.push(map);
+                }
+            }
+        }
+        maps
+    }
+
+    /// Counted from 1; 0 where there is none, or it is not looked at.
+    fn number(&self, map: Option<&TextureMap>) -> u32 {
+        map.and_then(|map| self.numbers.get(&key(map))).copied().unwrap_or(0)
+    }
+}
+
+fn key(map: &TextureMap) -> Key {
+    let TextureMap { texture, turn, offset, wrap } = map;
+    (*texture, turn.to_cols_array().map(f64::to_bits), offset.to_array().map(f64::to_bits), *wrap)
+}
+
+/// What numbers are multiplied by where a plan does not look at images: their means.
+struct Means<'a> {
+    scene: &'a Scene,
+    looks: bool,
+}
+
+impl Means<'_> {
+    fn of(&self, map: Option<&TextureMap>) -> DVec4 {
+        match map.filter(|_| !self.looks) {
+            Some(map) => self.scene.textures[map.texture].mean(),
+            None => DVec4::ONE,
+        }
+    }
+}
+
+/// The mean of what a surface sends out.
+pub(super) fn mean_emission(scene: &Scene, opaque: &Opaque) -> DVec3 {
+    let mean = opaque.emission_texture.map_or(DVec4::ONE, |map| scene.textures[map.texture].mean());
+    opaque.emission * mean.truncate()
+}
+
+/// What an interface of that index reflects head on.
+fn head(ior: f64) -> f32 {
+    ((ior - 1.0) / (ior + 1.0)).powi(2) as f32
+}
+
+/// What both kinds of materials have.
+fn common(material: &Material, maps: &Maps) -> MaterialRecord {
+    let normal = material.normal_map.as_ref();
+    let cutout = material.cutout.as_ref();
+    let (alpha, cutoff) = cutout.map_or((1.0, 0.0), |cutout| (cutout.alpha, cutout.cutoff.unwrap_or(-1.0)));
     MaterialRecord {
-        base_color: base_color.as_vec3(),
-        roughness: opaque.roughness as f32,
-        emission: opaque.emission.as_vec3(),
-        metallic: opaque.metallic as f32,
-        specular: opaque.specular as f32,
-        kind: MaterialRecord::OPAQUE,
-        texture: opaque.base_color_texture.map_or(0, |texture| texture as u32 + 1),
+        normal_map: maps.number(normal.map(|normal| &normal.map)),
+        normal_scale: normal.map_or(0.0, |normal| normal.scale as f32),
+        alpha_map: maps.number(cutout.and_then(|cutout| cutout.map.as_ref())),
+        alpha: alpha as f32,
+        alpha_cutoff: cutoff as f32,
+        transmission: 1.0,
         ..MaterialRecord::default()
     }
 }
 
-/// All textures in one buffer: where each starts, its width and its height, then the texels of each, linear as half floats, and
-/// of its halves.
-pub(super) fn texels(textures: &[Arc<Texture>]) -> Vec<u32> {
-    let mut words = vec![0; 3 * textures.len()];
-    for (number, texture) in textures.iter().enumerate() {
-        let (mut width, mut height) = (texture.width, texture.height);
-        let header = [words.len() as u32, width, height];
-        words[3 * number..][..3].copy_from_slice(&header);
-        let mut texels: Vec<[f32; 3]> = match &texture.texels {
-            Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| [r, g, b].map(image::decode_srgb)).collect(),
-            Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| [r, g, b].map(f16::to_f32)).collect(),
-        };
-        words.extend(texels.iter().copied().flat_map(pack_texel));
-        while width.max(height) > 1 {
-            (width, height, texels) = image::halved(&texels, width, height, |edge| edge);
-            words.extend(texels.iter().copied().flat_map(pack_texel));
+fn opaque_record(
+    scene: &Scene,
+    opaque: &Opaque,
+    means: &Means<'_>,
+    maps: &Maps,
+    base: MaterialRecord,
+) -> MaterialRecord {
+    let finish = means.of(opaque.metallic_roughness_texture.as_ref());
+    let base_color = opaque.base_color * means.of(opaque.base_color_texture.as_ref()).truncate();
+    let emission = opaque.emission * means.of(opaque.emission_texture.as_ref()).truncate();
+    MaterialRecord {
+        base_color: base_color.as_vec3(),
+        roughness: (opaque.roughness * finish.y) as f32,
+        emission: emission.as_vec3(),
+        metallic: (opaque.metallic * finish.z) as f32,
+        specular: opaque.specular as f32,
+        head: head(opaque.ior),
+        shines: luminance(mean_emission(scene, opaque)) as f32,
+        kind: MaterialRecord::OPAQUE,
+        color_map: maps.number(opaque.base_color_texture.as_ref()),
+        finish_map: maps.number(opaque.metallic_roughness_texture.as_ref()),
+        emission_map: maps.number(opaque.emission_texture.as_ref()),
+        ..base
+    }
+}
+
+/// All textures in one buffer, for `shaders/texture.glsl`: how each map places one of them, then the texels of each, linear as half
+/// floats, and of its halves.
+pub(super) fn texels(textures: &[Arc<Texture>], maps: &Maps) -> Vec<u32> {
+    let mut words = vec![0; MAP_WORDS * maps.all.len()];
+    let mut starts = vec![None; textures.len()];
+    for (number, map) in maps.all.iter().enumerate() {
+        let texture = &textures[map.texture];
+        let start = *starts[map.texture].get_or_insert_with(|| append(&mut words, texture));
+        let [horizontally, vertically] = map.wrap.map(|wrap| match wrap {
+            Wrap::Repeat => 0,
+            Wrap::Mirror => 1,
+            Wrap::Clamp => 2,
+        });
+        let header = &mut words[MAP_WORDS * number..][..MAP_WORDS];
+        header[..4].copy_from_slice(&[start, texture.width, texture.height, horizontally | vertically << 2]);
+        let numbers = map.turn.to_cols_array().into_iter().chain(map.offset.to_array());
+        for (word, number) in header[4..].iter_mut().zip(numbers) {
+            *word = (number as f32).to_bits();
         }
     }
     words
 }
 
-/// The mean colour of a texture.
-fn mean(texture: &Texture) -> DVec3 {
-    let wide = |texel: [f32; 3]| DVec3::from_array(texel.map(f64::from));
-    let sum: DVec3 = match &texture.texels {
-        Texels::Srgb(texels) => texels.iter().map(|&[r, g, b, _]| wide([r, g, b].map(image::decode_srgb))).sum(),
-        Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| wide([r, g, b].map(f16::to_f32))).sum(),
-    };
-    sum / f64::from(texture.width) / f64::from(texture.height)
+/// Words of a map, as in `shaders/texture.glsl`.
+const MAP_WORDS: usize = 10;
+
+/// Puts a texture and its halves behind what there is; out flows where it begins.
+fn append(words: &mut Vec<u32>, texture: &Texture) -> u32 {
+    let start = words.len() as u32;
+    let (mut width, mut height) = (texture.width, texture.height);
+    let mut texels: Vec<[f32; 4]> = texture.linear().collect();
+    words.extend(texels.iter().copied().flat_map(pack_texel));
+    while width.max(height) > 1 {
+        (width, height, texels) = image::halved(&texels, width, height, |edge| edge);
+        words.extend(texels.iter().copied().flat_map(pack_texel));
+    }
+    start
 }
 
-fn pack_texel(texel: [f32; 3]) -> [u32; 2] {
-    let [r, g, b] = texel.map(|value| u32::from(f16::from_f32(value).to_bits()));
-    [r | g << 16, b]
+fn pack_texel(texel: [f32; 4]) -> [u32; 2] {
+    let [r, g, b, a] = texel.map(|value| u32::from(f16::from_f32(value).to_bits()));
+    [r | g << 16, b | a << 16]
 }
 
 /// Whether light is spread by a surface of that material.

@@ -22,6 +22,7 @@ mod sampling;
 mod single;
 mod skylight;
 mod slices;
+mod tangents;
 mod tree;
 mod view;
 

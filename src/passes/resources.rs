@@ -11,8 +11,9 @@ use xxhash_rust::xxh3::Xxh3;
 use super::double::{Facet, Placed};
 use super::emitters;
 use super::geometry::{Draw, Geometry, Layout};
-use super::materials::{is_rough, materials, texels};
+use super::materials::{Maps, is_rough, materials, texels};
 use super::skylight;
+use super::tangents::tangents;
 use super::view::View;
 use crate::effects::Effect;
 use crate::gpu::{
@@ -73,6 +74,8 @@ struct Meshes {
     traced: Option<TracedMeshes>,
     /// For `double`.
     facets: Option<Bind>,
+    /// Where tangents begin behind the coordinates, if there are any.
+    first_tangent: Option<u32>,
 }
 
 /// What only traced models read of meshes.
@@ -96,7 +99,10 @@ impl Meshes {
             Some(TracedMeshes { hierarchies: Hierarchies::Nodes(_, here), .. }) => *here == room,
             _ => true,
         };
-        fits && self.layout.is_of(scene, trace) && self.facets.is_some() == (plan.model == Model::Double)
+        let has_tangents = trace.is_some() && plan.effects.contains(Effect::NormalMaps);
+        fits && self.layout.is_of(scene, trace)
+            && self.facets.is_some() == (plan.model == Model::Double)
+            && self.first_tangent.is_some() == has_tangents
     }
 
     fn new(
@@ -107,8 +113,13 @@ impl Meshes {
         room: u32,
     ) -> Result<(Self, Duration)> {
         let start = Instant::now();
-        let (layout, arrays) = Layout::new(scene, trace);
+        let (layout, mut arrays) = Layout::new(scene, trace);
         let mut acceleration = start.elapsed();
+        let has_tangents = trace.is_some() && plan.effects.contains(Effect::NormalMaps);
+        let first_tangent = has_tangents.then_some(arrays.uvs.len() as u32 / 2);
+        if has_tangents {
+            arrays.uvs.extend(scene.meshes.iter().flat_map(|mesh| tangents(mesh)).flatten());
+        }
         let mut traced = None;
         if let Some(trace) = trace {
             let corners = Arc::new(upload.commands.upload_buffer("corners of the triangles", &arrays.corners)?);
@@ -141,6 +152,7 @@ impl Meshes {
             layout,
             traced,
             facets,
+            first_tangent,
         };
         Ok((meshes, acceleration))
     }
@@ -189,12 +201,15 @@ impl Sky {
 /// Textures on the device.
 struct Textures {
     of: Vec<Arc<Texture>>,
+    maps: Maps,
     texels: Bind,
 }
 
 impl Textures {
-    fn is_of(&self, textures: &[Arc<Texture>]) -> bool {
-        self.of.len() == textures.len() && self.of.iter().zip(textures).all(|(a, b)| Arc::ptr_eq(a, b))
+    fn is_of(&self, textures: &[Arc<Texture>], maps: &Maps) -> bool {
+        self.maps == *maps
+            && self.of.len() == textures.len()
+            && self.of.iter().zip(textures).all(|(a, b)| Arc::ptr_eq(a, b))
     }
 }
 
@@ -256,7 +271,8 @@ impl Resources {
                 advice: "remove triangles that are millions of times smaller than the others",
             });
         }
-        let (mut materials, albedos) = materials(scene, plan, &view);
+        let maps = Maps::new(scene, plan);
+        let (mut materials, albedos) = materials(scene, plan, &view, &maps);
         if materials.is_empty() {
             // Shaders may read the first one before they know that nothing is there.
             materials.push(MaterialRecord::default());
@@ -274,11 +290,14 @@ impl Resources {
             Some(sky) => sky.clone(),
             None => Arc::new(Sky::new(&mut upload, panorama, levels, cells)?),
         };
-        let worn: &[_] = if plan.effects.contains(Effect::Textures) { &scene.textures } else { &[] };
-        let kept = before.map(|before| &before.textures).filter(|textures| textures.is_of(worn));
+        let worn: &[_] = if maps.all.is_empty() { &[] } else { &scene.textures };
+        let kept = before.map(|before| &before.textures).filter(|textures| textures.is_of(worn, &maps));
         let textures = match kept {
             Some(textures) => textures.clone(),
-            None => Arc::new(Textures { of: worn.to_vec(), texels: upload.buffer("texels", &texels(worn))? }),
+            None => {
+                let texels = upload.buffer("texels", &texels(worn, &maps))?;
+                Arc::new(Textures { of: worn.to_vec(), maps, texels })
+            }
         };
         let ranked = ranked_materials(scene, &geometry);
         if ranked.len() > 1 << 16 {
@@ -298,6 +317,7 @@ impl Resources {
             camera_bodies: std::array::from_fn(|i| around[2 * i] << 16 | around[2 * i + 1]),
             camera_index: medium.map_or(1.0, |medium| materials[medium as usize].refraction_index),
             camera_medium: medium.map_or(0, |medium| medium + 1),
+            first_tangent: meshes.first_tangent.unwrap_or(0),
             ..frame(scene, plan, &view, lights.len() as u32)
         };
         upload.hash(&[paths_frame(frame)]);
@@ -353,7 +373,7 @@ impl Resources {
             layered.push(upload.buffer("instances in the picture", &placed)?);
         }
         let is_image = panorama.is_some();
-        let footprints = plan.footprints && trace.is_some() && (is_image || plan.effects.contains(Effect::Textures));
+        let footprints = plan.footprints && trace.is_some() && (is_image || !textures.maps.all.is_empty());
         let fingerprint = upload.hash.as_ref().map(Xxh3::digest128);
         Ok(Self {
             group: BindGroup::new(upload.commands.gpu(), "scene", bindings)?,

@@ -27,7 +27,7 @@ const MOST_RECORDS: u32 = 1 << 19;
 
 /// Bytes of `Sample`, `Record` and what stands before the records, in `shaders/pixel.glsl` and `shaders/records.glsl`.
 const SAMPLE_BYTES: u64 = 32;
-const RECORD_BYTES: u64 = 80;
+const RECORD_BYTES: u64 = 96;
 const HEADER_BYTES: u64 = 16;
 
 pub(super) struct Tree {

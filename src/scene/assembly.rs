@@ -2,17 +2,18 @@
 //! and textures that the files bring along; a file is read once, however many objects show it.
 
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use glam::DAffine3;
+use glam::{DAffine3, DVec3};
 
 use super::files::Files;
 use super::mesh::FARTHEST;
 use super::mesh_file::{Image, MeshFile};
 use super::texture::Textures;
-use super::{Bounds, Material, Mesh, Object, Surface};
+use super::{Bounds, Material, Mesh, Object, Opaque, Surface};
 use crate::Result;
 
 /// Meshes, objects, materials and textures so far.
@@ -38,6 +39,16 @@ struct Loaded {
     first_mesh: usize,
     /// Where the materials went, once something wears them.
     first_material: Option<usize>,
+}
+
+impl Loaded {
+    /// Moves what `file` holds to all other `meshes`, and what is wrong with them to the `warnings`.
+    fn new(mut file: MeshFile, meshes: &mut Vec<Arc<Mesh>>, warnings: &mut Vec<String>) -> Self {
+        warnings.append(&mut file.warnings);
+        let first_mesh = meshes.len();
+        meshes.extend(std::mem::take(&mut file.meshes).into_iter().map(Arc::new));
+        Self { file, first_mesh, first_material: None }
+    }
 }
 
 /// Where an object stands.
@@ -91,33 +102,29 @@ impl Assembly {
         });
         for (identity, _) in &distinct {
             if let Some(file) = results.remove(identity) {
-                self.keep(identity.clone(), file?);
+                let loaded = Loaded::new(file?, &mut self.meshes, &mut self.warnings);
+                self.read.insert(identity.clone(), loaded);
             }
         }
         Ok(())
     }
 
-    fn keep(&mut self, identity: PathBuf, mut file: MeshFile) {
-        self.warnings.append(&mut file.warnings);
-        let first_mesh = self.meshes.len();
-        self.meshes.extend(std::mem::take(&mut file.meshes).into_iter().map(Arc::new));
-        self.read.insert(identity, Loaded { file, first_mesh, first_material: None });
-    }
-
     /// Adds what the mesh file at `path` holds. Out flows what else there is in it.
-    pub fn add(&mut self, files: Files, path: &Path, wear: Wear, place: &Placement) -> Result<Option<&mut MeshFile>> {
-        let identity = files.identity(path);
-        if !self.read.contains_key(&identity) {
-            let file = MeshFile::read(files, path, self.repair)?;
-            self.keep(identity.clone(), file);
-        }
-        let Some(Loaded { file, first_mesh, first_material }) = self.read.get_mut(&identity) else { return Ok(None) };
+    pub fn add(&mut self, files: Files, path: &Path, wear: Wear, place: &Placement) -> Result<&mut MeshFile> {
+        let loaded = match self.read.entry(files.identity(path)) {
+            Entry::Occupied(known) => known.into_mut(),
+            Entry::Vacant(place) => {
+                let file = MeshFile::read(files, path, self.repair)?;
+                place.insert(Loaded::new(file, &mut self.meshes, &mut self.warnings))
+            }
+        };
+        let Loaded { file, first_mesh, first_material } = loaded;
         let own = matches!(wear, Wear::Own);
         if own && first_material.is_none() {
             *first_material = Some(self.materials.len());
             self.warnings.append(&mut file.material_warnings);
             for mut material in file.materials.drain(..) {
-                open_image(files, &mut material, &file.images, &mut self.textures, &mut self.warnings);
+                open_images(files, &mut material, &file.images, &mut self.textures, &mut self.warnings);
                 self.materials.push(material);
             }
         }
@@ -143,7 +150,7 @@ impl Assembly {
                 smooth: place.smooth,
             });
         }
-        Ok(Some(file))
+        Ok(file)
     }
 
     /// Whether the objects from `first` on are where they can be rendered; the error says what to do.
@@ -171,21 +178,34 @@ impl Assembly {
     }
 }
 
-/// Puts the texture in the place of an index into the `images` of a mesh file. As anywhere in such a file, an image
-/// that cannot be read is a warning.
-fn open_image(
+/// Puts textures in the places of indices into the `images` of a mesh file. As anywhere in such a file, an image that
+/// cannot be read is a warning.
+fn open_images(
     files: Files,
     material: &mut Material,
     images: &[Image],
     textures: &mut Textures,
     warnings: &mut Vec<String>,
 ) {
-    let Surface::Opaque(opaque) = &mut material.surface else { return };
-    let Some(image) = opaque.base_color_texture else { return };
-    opaque.base_color_texture = textures
-        .open_image(files, &images[image], warnings)
-        .map_err(|error| {
-            warnings.push(format!("{}; material {:?} has its colour instead", error.in_full(), material.name))
-        })
-        .ok();
+    let name = material.name.clone();
+    let color = match &material.surface {
+        Surface::Opaque(opaque) => opaque.base_color_texture,
+        Surface::Dielectric(_) => None,
+    };
+    let replaces_color = color.is_some_and(|map| images[map.texture].replaces_color);
+    material.retain_maps(|map| match textures.open(files, &images[map.texture], warnings) {
+        Ok(texture) => {
+            map.texture = texture;
+            true
+        }
+        Err(error) => {
+            warnings.push(format!("{}; material {name:?} goes without it", error.in_full()));
+            false
+        }
+    });
+    if let Surface::Opaque(Opaque { base_color, base_color_texture: Some(_), .. }) = &mut material.surface
+        && replaces_color
+    {
+        *base_color = DVec3::ONE;
+    }
 }

@@ -9,12 +9,16 @@ use super::assembly::{Assembly, Placement, Wear};
 use super::camera::DEFAULT_FOV;
 use super::files::Files;
 use super::material::Glass;
-use super::mesh_file;
+use super::mesh_file::{self, Image, ImageSource};
 use super::render_table::options;
 use super::table::{
     Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT, text,
 };
-use super::{Camera, Dielectric, Dispersion, Material, Opaque, Overrides, PointLight, Surface, builtin};
+use super::texture::Encoding;
+use super::{
+    Camera, Coating, Cutout, Dielectric, Dispersion, Material, NormalMap, Opaque, Overrides, PointLight, Surface,
+    TextureMap, builtin,
+};
 use crate::Result;
 use crate::options::RenderArgs;
 
@@ -72,8 +76,8 @@ pub fn read(files: Files, path: &Path, overrides: &Overrides) -> Result<SceneFil
     let mut assembly = Assembly::new(overrides.repair.or(own));
     if let Some(materials) = root.get("material") {
         for entry in materials.any_table("material.NAME")?.entries() {
-            let surface = reader.surface(entry, &mut assembly)?;
-            assembly.materials.push(Material { name: entry.key.to_owned(), surface });
+            let material = reader.material(entry, &mut assembly)?;
+            assembly.materials.push(material);
         }
     }
     let objects = root.or("object", Vec::new(), |objects| {
@@ -114,13 +118,19 @@ struct Reader<'a> {
     folder: &'a Path,
 }
 
-/// The keys of a dielectric, its kind first.
-pub const DIELECTRIC_KEYS: [&str; 8] =
-    ["kind", "ior", "roughness", "dispersion", "attenuation_color", "attenuation_distance", "thin_walled", "priority"];
+/// The keys of a dielectric that are numbers.
+pub const DIELECTRIC_KEYS: [&str; 7] =
+    ["ior", "roughness", "dispersion", "attenuation_color", "attenuation_distance", "thin_walled", "priority"];
 
-/// The keys of an opaque material.
-pub const OPAQUE_KEYS: [&str; 7] =
-    ["kind", "base_color", "base_color_texture", "metallic", "roughness", "specular", "emission"];
+/// The keys of an opaque material that are numbers.
+pub const OPAQUE_KEYS: [&str; 5] = ["base_color", "metallic", "roughness", "specular", "emission"];
+
+/// Further keys of a dielectric.
+const COATING_KEYS: [&str; 3] = ["base_color", "transmission", "transmission_texture"];
+
+/// Further keys of any material.
+const MAP_KEYS: [&str; 5] =
+    ["base_color_texture", "metallic_roughness_texture", "normal_texture", "normal_scale", "alpha_cutoff"];
 
 #[derive(Clone, Copy)]
 enum Kind {
@@ -147,37 +157,109 @@ impl Reader<'_> {
         })
     }
 
-    fn surface(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<Surface> {
+    fn material(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<Material> {
         let name = format!("material.{}", entry.key);
         let table = entry.any_table(&name)?;
         let Some(kind) = table.get("kind") else {
             return Err(table.error(format!("missing key \"kind\" in [{name}]; \"dielectric\" or \"opaque\"")));
         };
-        match kind.choice(&[("dielectric", Kind::Dielectric), ("opaque", Kind::Opaque)])? {
-            Kind::Dielectric => dielectric(&entry.table(&name, &DIELECTRIC_KEYS)?),
-            Kind::Opaque => self.opaque(&entry.table(&name, &OPAQUE_KEYS)?, assembly),
-        }
+        let kind = kind.choice(&[("dielectric", Kind::Dielectric), ("opaque", Kind::Opaque)])?;
+        let (own, others): (&[_], &[_]) = match kind {
+            Kind::Dielectric => (&DIELECTRIC_KEYS, &COATING_KEYS),
+            Kind::Opaque => (&OPAQUE_KEYS, &["emission_texture"]),
+        };
+        let table = entry.table(&name, &[&["kind"], own, others, &MAP_KEYS].concat())?;
+        let base_color_texture = self.texture(&table, "base_color_texture", Encoding::Color, assembly)?;
+        let surface = match kind {
+            Kind::Dielectric => self.dielectric(&table, base_color_texture, assembly)?,
+            Kind::Opaque => self.opaque(&table, base_color_texture, assembly)?,
+        };
+        let normal = self.texture(&table, "normal_texture", Encoding::Data, assembly)?;
+        let scale = table.or("normal_scale", 1.0, |entry| entry.number(&FINITE))?;
+        let cutout = match (table.get("alpha_cutoff"), base_color_texture) {
+            (None, _) => None,
+            (Some(entry), None) => {
+                return Err(entry.error("alpha_cutoff needs a base_color_texture, whose alpha it is about"));
+            }
+            (Some(entry), map) => Some(Cutout { alpha: 1.0, map, cutoff: Some(entry.number(&UNIT)?) }),
+        };
+        let normal_map = normal.map(|map| NormalMap { map, scale });
+        Ok(Material { name: entry.key.to_owned(), surface, normal_map, cutout })
     }
 
-    fn opaque(&self, table: &Table<'_>, assembly: &mut Assembly) -> Result<Surface> {
-        let plain = Opaque::default();
-        let texture = table.get("base_color_texture");
-        if let (Some(texture), Some(_)) = (texture, table.get("base_color")) {
-            return Err(texture.error("base_color_texture stands beside base_color; keep one of them"));
-        }
-        Ok(Surface::Opaque(Opaque {
-            base_color: table.or("base_color", plain.base_color, |entry| entry.triple(&UNIT))?,
-            base_color_texture: texture.map(|entry| self.texture(entry, assembly)).transpose()?,
-            metallic: table.or("metallic", plain.metallic, |entry| entry.number(&UNIT))?,
-            roughness: table.or("roughness", plain.roughness, |entry| entry.number(&UNIT))?,
-            specular: table.or("specular", plain.specular, |entry| entry.number(&UNIT))?,
-            emission: table.or("emission", plain.emission, |entry| entry.triple(&LIGHT))?,
+    fn dielectric(
+        &self,
+        table: &Table<'_>,
+        base_color_texture: Option<TextureMap>,
+        assembly: &mut Assembly,
+    ) -> Result<Surface> {
+        let (clear, bare) = (Dielectric::default(), Coating::default());
+        let (ior, own) = table.or("ior", (clear.ior, clear.dispersion), index_of)?;
+        let coating = Coating {
+            base_color: table.or("base_color", bare.base_color, |entry| entry.triple(&UNIT))?,
+            base_color_texture: self.colored_once(table, base_color_texture)?,
+            transmission: table.or("transmission", bare.transmission, |entry| entry.number(&UNIT))?,
+            transmission_texture: self.texture(table, "transmission_texture", Encoding::Data, assembly)?,
+            metallic: bare.metallic,
+        };
+        Ok(Surface::Dielectric(Dielectric {
+            ior,
+            roughness: table.or("roughness", clear.roughness, |entry| entry.number(&UNIT))?,
+            dispersion: table.or("dispersion", own, dispersion_of)?,
+            attenuation_color: table.or("attenuation_color", clear.attenuation_color, |entry| entry.triple(&UNIT))?,
+            attenuation_distance: table
+                .or("attenuation_distance", clear.attenuation_distance, |entry| entry.number(&POSITIVE_OR_INFINITE))?,
+            thin_walled: table.or("thin_walled", clear.thin_walled, |entry| entry.boolean())?,
+            priority: table.or("priority", clear.priority, |entry| entry.integer())?,
+            metallic_roughness_texture: self.texture(table, "metallic_roughness_texture", Encoding::Data, assembly)?,
+            coating: (coating != bare).then(|| Box::new(coating)),
         }))
     }
 
-    fn texture(&self, entry: Entry<'_>, assembly: &mut Assembly) -> Result<usize> {
-        let texture = assembly.textures.open(self.files, &entry.file(self.files, self.folder)?, &mut assembly.warnings);
-        texture.map_err(|error| entry.error(format!("{}: {}", entry.key, error.in_full())))
+    fn opaque(
+        &self,
+        table: &Table<'_>,
+        base_color_texture: Option<TextureMap>,
+        assembly: &mut Assembly,
+    ) -> Result<Surface> {
+        let plain = Opaque::default();
+        let base_color = if base_color_texture.is_some() { DVec3::ONE } else { plain.base_color };
+        let emission_texture = self.texture(table, "emission_texture", Encoding::Color, assembly)?;
+        let emission = if emission_texture.is_some() { DVec3::ONE } else { plain.emission };
+        Ok(Surface::Opaque(Opaque {
+            base_color_texture: self.colored_once(table, base_color_texture)?,
+            base_color: table.or("base_color", base_color, |entry| entry.triple(&UNIT))?,
+            metallic: table.or("metallic", plain.metallic, |entry| entry.number(&UNIT))?,
+            roughness: table.or("roughness", plain.roughness, |entry| entry.number(&UNIT))?,
+            metallic_roughness_texture: self.texture(table, "metallic_roughness_texture", Encoding::Data, assembly)?,
+            ior: plain.ior,
+            specular: table.or("specular", plain.specular, |entry| entry.number(&UNIT))?,
+            emission: table.or("emission", emission, |entry| entry.triple(&LIGHT))?,
+            emission_texture,
+        }))
+    }
+
+    /// The image of the base colour, unless there is a colour too.
+    fn colored_once(&self, table: &Table<'_>, texture: Option<TextureMap>) -> Result<Option<TextureMap>> {
+        match (table.get("base_color_texture"), table.get("base_color")) {
+            (Some(entry), Some(_)) => Err(entry.error("base_color_texture stands beside base_color; keep one of them")),
+            _ => Ok(texture),
+        }
+    }
+
+    fn texture(
+        &self,
+        table: &Table<'_>,
+        key: &'static str,
+        encoding: Encoding,
+        assembly: &mut Assembly,
+    ) -> Result<Option<TextureMap>> {
+        let Some(entry) = table.get(key) else { return Ok(None) };
+        let image =
+            Image { source: ImageSource::File(entry.file(self.files, self.folder)?), encoding, replaces_color: true };
+        let texture = assembly.textures.open(self.files, &image, &mut assembly.warnings);
+        let texture = texture.map_err(|error| entry.error(format!("{}: {}", entry.key, error.in_full())))?;
+        Ok(Some(TextureMap::of(texture)))
     }
 
     fn object<'a>(&self, entry: Entry<'a>, number: usize, materials: &[Material]) -> Result<ObjectTable<'a>> {
@@ -229,21 +311,6 @@ pub fn dispersion_of(entry: Entry<'_>) -> Result<Dispersion> {
         0.0 => Ok(Dispersion::None),
         number => Ok(Dispersion::Khr(number)),
     }
-}
-
-fn dielectric(table: &Table<'_>) -> Result<Surface> {
-    let clear = Dielectric::default();
-    let (ior, own) = table.or("ior", (clear.ior, clear.dispersion), index_of)?;
-    Ok(Surface::Dielectric(Dielectric {
-        ior,
-        roughness: table.or("roughness", clear.roughness, |entry| entry.number(&UNIT))?,
-        dispersion: table.or("dispersion", own, dispersion_of)?,
-        attenuation_color: table.or("attenuation_color", clear.attenuation_color, |entry| entry.triple(&UNIT))?,
-        attenuation_distance: table
-            .or("attenuation_distance", clear.attenuation_distance, |entry| entry.number(&POSITIVE_OR_INFINITE))?,
-        thin_walled: table.or("thin_walled", clear.thin_walled, |entry| entry.boolean())?,
-        priority: table.or("priority", clear.priority, |entry| entry.integer())?,
-    }))
 }
 
 fn material_number(entry: Entry<'_>, materials: &[Material]) -> Result<usize> {

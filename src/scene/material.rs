@@ -2,6 +2,7 @@
 
 use glam::DVec3;
 
+use super::maps::{Cutout, NormalMap, TextureMap};
 use crate::optics::medium::dispersed_index;
 
 /// A surface with a name.
@@ -11,6 +12,10 @@ pub struct Material {
     pub name: String,
     /// What it is.
     pub surface: Surface,
+    /// Bends its normals.
+    pub normal_map: Option<NormalMap>,
+    /// Where it is not there.
+    pub cutout: Option<Cutout>,
 }
 
 /// What a surface does with light.
@@ -39,6 +44,25 @@ pub struct Dielectric {
     pub thin_walled: bool,
     /// Where dielectrics overlap, the higher one is there.
     pub priority: i32,
+    /// Green is multiplied with the roughness, blue with the [`Coating::metallic`].
+    pub metallic_roughness_texture: Option<TextureMap>,
+    /// What its surface does to light that goes through.
+    pub coating: Option<Box<Coating>>,
+}
+
+/// The surface of a dielectric where it colours light, or holds it back: below the interface it is painted.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coating {
+    /// What light is multiplied by that goes through, once an interface, and the reflectance of what is painted; 0 to 1.
+    pub base_color: DVec3,
+    /// Multiplied with [`Coating::base_color`].
+    pub base_color_texture: Option<TextureMap>,
+    /// The share of the surface that lets light through, 0 to 1; the rest is opaque.
+    pub transmission: f64,
+    /// Red is multiplied with it.
+    pub transmission_texture: Option<TextureMap>,
+    /// Metal lets nothing through, 0 to 1.
+    pub metallic: f64,
 }
 
 impl Default for Dielectric {
@@ -52,6 +76,21 @@ impl Default for Dielectric {
             attenuation_distance: f64::INFINITY,
             thin_walled: false,
             priority: 0,
+            metallic_roughness_texture: None,
+            coating: None,
+        }
+    }
+}
+
+impl Default for Coating {
+    /// Nothing is painted.
+    fn default() -> Self {
+        Self {
+            base_color: DVec3::ONE,
+            base_color_texture: None,
+            transmission: 1.0,
+            transmission_texture: None,
+            metallic: 0.0,
         }
     }
 }
@@ -91,16 +130,22 @@ impl Dielectric {
 pub struct Opaque {
     /// Reflectance, 0 to 1.
     pub base_color: DVec3,
-    /// An image in the place of [`Opaque::base_color`]: index into [`super::Scene::textures`].
-    pub base_color_texture: Option<usize>,
+    /// Multiplied with [`Opaque::base_color`].
+    pub base_color_texture: Option<TextureMap>,
     /// 0: dielectric below, 1: metal.
     pub metallic: f64,
     /// Perceptual roughness, 0 to 1; the alpha of GGX is its square.
     pub roughness: f64,
+    /// Green is multiplied with the roughness, blue with [`Opaque::metallic`].
+    pub metallic_roughness_texture: Option<TextureMap>,
+    /// Index of refraction, as far as its specular reflection tells: where it is no metal that is ((n - 1) / (n + 1))^2 head on.
+    pub ior: f64,
     /// Strength of the specular reflection, as in KHR_materials_specular; 0: purely Lambertian.
     pub specular: f64,
     /// Radiance that it sends out.
     pub emission: DVec3,
+    /// Multiplied with [`Opaque::emission`].
+    pub emission_texture: Option<TextureMap>,
 }
 
 impl Default for Opaque {
@@ -110,8 +155,11 @@ impl Default for Opaque {
             base_color_texture: None,
             metallic: 0.0,
             roughness: 1.0,
+            metallic_roughness_texture: None,
+            ior: 1.5,
             specular: 1.0,
             emission: DVec3::ZERO,
+            emission_texture: None,
         }
     }
 }
@@ -129,7 +177,61 @@ impl Surface {
 impl Material {
     /// What an object wears that has no material of its own.
     pub fn clear_glass() -> Self {
-        Self { name: "clear glass".into(), surface: Surface::Dielectric(Dielectric::default()) }
+        Self::new("clear glass".into(), Surface::Dielectric(Dielectric::default()))
+    }
+
+    /// What has this surface everywhere.
+    pub fn new(name: String, surface: Surface) -> Self {
+        Self { name, surface, normal_map: None, cutout: None }
+    }
+
+    /// The images that it wears.
+    pub fn maps(&self) -> impl Iterator<Item = &TextureMap> {
+        let of_surface = match &self.surface {
+            Surface::Dielectric(glass) => {
+                let coating = glass.coating.as_deref();
+                let color = coating.and_then(|coating| coating.base_color_texture.as_ref());
+                let transmission = coating.and_then(|coating| coating.transmission_texture.as_ref());
+                [color, glass.metallic_roughness_texture.as_ref(), transmission]
+            }
+            Surface::Opaque(opaque) => [
+                opaque.base_color_texture.as_ref(),
+                opaque.metallic_roughness_texture.as_ref(),
+                opaque.emission_texture.as_ref(),
+            ],
+        };
+        let normal = self.normal_map.as_ref().map(|normal| &normal.map);
+        let alpha = self.cutout.as_ref().and_then(|cutout| cutout.map.as_ref());
+        of_surface.into_iter().chain([normal, alpha]).flatten()
+    }
+
+    /// Takes the images off that `keep` says no to.
+    pub fn retain_maps(&mut self, mut keep: impl FnMut(&mut TextureMap) -> bool) {
+        let mut check = |map: &mut Option<TextureMap>| {
+            if map.as_mut().is_some_and(|map| !keep(map)) {
+                *map = None;
+            }
+        };
+        match &mut self.surface {
+            Surface::Dielectric(glass) => {
+                check(&mut glass.metallic_roughness_texture);
+                if let Some(coating) = &mut glass.coating {
+                    check(&mut coating.base_color_texture);
+                    check(&mut coating.transmission_texture);
+                }
+            }
+            Surface::Opaque(opaque) => {
+                check(&mut opaque.base_color_texture);
+                check(&mut opaque.metallic_roughness_texture);
+                check(&mut opaque.emission_texture);
+            }
+        }
+        if let Some(cutout) = &mut self.cutout {
+            check(&mut cutout.map);
+        }
+        if self.normal_map.as_mut().is_some_and(|normal| !keep(&mut normal.map)) {
+            self.normal_map = None;
+        }
     }
 }
 

@@ -3,9 +3,10 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 use super::files::Files;
+use super::texture::Encoding;
 use super::{Camera, Material, Mesh, PointLight, gltf, obj};
 use crate::Result;
 
@@ -52,8 +53,10 @@ pub struct Part {
 pub struct Image {
     /// Where its bytes are.
     pub source: ImageSource,
-    /// What its colours are multiplied by, 0 to 1.
-    pub factor: DVec3,
+    /// What they stand for.
+    pub encoding: Encoding,
+    /// Whether it stands in the place of the base colour, not multiplied with it.
+    pub replaces_color: bool,
 }
 
 /// Where the bytes of an image are.
@@ -68,13 +71,6 @@ pub enum ImageSource {
         /// As an image file holds them.
         bytes: Arc<[u8]>,
     },
-}
-
-impl Image {
-    /// A file, as it is.
-    pub fn file(path: PathBuf) -> Self {
-        Self { source: ImageSource::File(path), factor: DVec3::ONE }
-    }
 }
 
 impl MeshFile {

@@ -14,6 +14,7 @@ mod environment;
 mod file;
 mod files;
 mod gltf;
+mod maps;
 mod material;
 mod mesh;
 mod mesh_file;
@@ -39,9 +40,10 @@ pub use camera::Camera;
 pub use doctor::{Ailment, Diagnosis, Finding, Mending, Nest, Nesting};
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
 pub(crate) use files::Files;
-pub use material::{Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
+pub use maps::{Cutout, NormalMap, TextureMap, Wrap};
+pub use material::{Coating, Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
 pub use mesh::{FaultSites, Mesh, MeshFaults, RawMesh, Refusal};
-pub use texture::{Texels, Texture};
+pub use texture::{Encoding, Texels, Texture};
 pub use touching::Touch;
 
 use crate::options::RenderArgs;
@@ -278,13 +280,13 @@ fn warn_of_missing_uvs(
     let mut told = HashSet::new();
     for object in objects {
         let (mesh, material) = (&meshes[object.mesh], &materials[object.material]);
-        let Surface::Opaque(Opaque { base_color_texture: Some(texture), .. }) = material.surface else { continue };
+        let Some(TextureMap { texture, .. }) = material.maps().next() else { continue };
         if mesh.uvs.is_empty() && told.insert((object.mesh, object.material)) {
             warnings.push(format!(
                 "{}: has no texture coordinates; material {:?} shows the corner of {} all over it",
                 mesh.name,
                 material.name,
-                textures[texture].name()
+                textures[*texture].name()
             ));
         }
     }
@@ -300,11 +302,8 @@ fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
         false => (Wear::ClearGlass, Some(0)),
     };
     let place = Placement { number, transform: DAffine3::IDENTITY, smooth: true };
-    let (mut camera, mut lights, mut warnings) = (None, Vec::new(), Vec::new());
-    if let Some(file) = assembly.add(Files::Disk, path, wear, &place)? {
-        let MeshFile { camera: own, lights: all, scene_warnings, .. } = file;
-        (camera, lights, warnings) = (*own, std::mem::take(all), std::mem::take(scene_warnings));
-    }
+    let MeshFile { camera, lights, scene_warnings, .. } = assembly.add(Files::Disk, path, wear, &place)?;
+    let (camera, lights, mut warnings) = (*camera, std::mem::take(lights), std::mem::take(scene_warnings));
     assembly.warnings.append(&mut warnings);
     assembly.check_reach(0).map_err(|message| Error::input(path, 0, message))?;
     let (environment, render) = (EnvironmentTable::default(), RenderArgs::default());

@@ -9,6 +9,9 @@
 //! | `Tf` | `attenuation_color` of a dielectric at 1 m, MTL having no distance |
 //! | `Kd`, `map_Kd`, `Pm`, `Ke` | base colour and its image, metallic, emission of an opaque surface |
 //! | `illum` 0 or 1, or black `Ks` | no specular reflection of an opaque surface |
+//! | `map_Ke` | image of the emission, multiplied by `Ke` unless that is black |
+//! | `norm`; `map_Bump` or `bump` with `-bm` | map of normals, of a grey image made from its heights, in texels; its strength |
+//! | `map_d` | the surface is not there where it is darker than a half |
 //!
 //! A line that cannot be understood is left out with a remark, a value out of range is moved to the nearest end of the
 //! range with a remark: an MTL file is a by-product, and many are careless. `tobj` reads a text without such lines,
@@ -20,8 +23,10 @@ use std::path::Path;
 use glam::DVec3;
 
 use super::files::Files;
+use super::maps::{Cutout, NormalMap, TextureMap};
 use super::material::{Dielectric, Material, Opaque, Surface};
-use super::mesh_file::{Image, shorten};
+use super::mesh_file::{Image, ImageSource, shorten};
+use super::texture::Encoding;
 
 /// Metres over which `Tf` is taken to act.
 const FILTER_DISTANCE: f64 = 1.0;
@@ -112,7 +117,16 @@ fn tidy_line(line: &str) -> Option<String> {
             Some(format!("{keyword} {number}"))
         }
         "illum" => rest.split_whitespace().next()?.parse().ok().map(|model: u8| format!("illum {model}")),
-        "map_Kd" => image_name(rest).map(|name| format!("map_Kd {name}")),
+        "map_Kd" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d" | "norm" => {
+            image_name(rest).map(|name| format!("{keyword} {name}"))
+        }
+        "map_Bump" | "map_bump" | "bump" => image_name(rest).map(|name| {
+            let words: Vec<_> = rest.split_whitespace().collect();
+            let strength = words.array_windows().find(|[option, _]| *option == "-bm");
+            let strength = strength.and_then(|[_, number]| number.parse::<f32>().ok()).unwrap_or(1.0);
+            // Under names of our own, which tobj leaves as they are.
+            format!("bump_strength {strength}\nbump_image {name}")
+        }),
         _ => Some(String::new()),
     }
 }
@@ -152,7 +166,13 @@ impl Converter<'_> {
     fn convert(mut self) -> Material {
         let surface =
             if self.is_dielectric() { Surface::Dielectric(self.dielectric()) } else { Surface::Opaque(self.opaque()) };
-        Material { name: self.material.name.clone(), surface }
+        if let Some(key) = ["map_Pr", "map_Pm"].into_iter().find(|key| self.material.unknown_param.contains_key(*key)) {
+            self.remark(&format!("{key} is not read; its number is used"));
+        }
+        let mut material = Material::new(self.material.name.clone(), surface);
+        material.normal_map = self.normal_map();
+        material.cutout = self.cutout();
+        material
     }
 
     fn is_dielectric(&self) -> bool {
@@ -200,20 +220,57 @@ impl Converter<'_> {
         let metallic =
             self.number("Pm").map_or(plain.metallic, |m| self.within("Pm", m.into(), 0.0, 1.0, plain.metallic));
         let matt = matches!(self.material.illumination_model, Some(0 | 1)) || self.material.specular == Some([0.0; 3]);
-        let texture = self.texture();
         let specular = if matt { 0.0 } else { plain.specular };
-        Opaque { base_color, base_color_texture: texture, metallic, roughness, specular, emission }
+        let base_color_texture = self.map("map_Kd", Encoding::Color);
+        let emission_texture = self.map("map_Ke", Encoding::Color);
+        let emission = if emission_texture.is_some() && emission == DVec3::ZERO { DVec3::ONE } else { emission };
+        Opaque {
+            base_color,
+            base_color_texture,
+            metallic,
+            roughness,
+            metallic_roughness_texture: None,
+            ior: plain.ior,
+            specular,
+            emission,
+            emission_texture,
+        }
     }
 
-    fn texture(&mut self) -> Option<usize> {
-        // Exporters for Windows write its separator.
-        let name = self.material.diffuse_texture.as_ref()?.replace('\\', "/");
-        let path = self.path.parent().unwrap_or(Path::new("")).join(name);
-        if self.files.exists(&path) {
-            self.images.push(Image::file(path));
-            return Some(self.images.len() - 1);
+    fn normal_map(&mut self) -> Option<NormalMap> {
+        if let Some(map) = self.map("norm", Encoding::Data) {
+            return Some(NormalMap { map, scale: 1.0 });
         }
-        self.remark(&format!("map_Kd {:?} does not exist; the colour is used", path.display().to_string()));
+        let map = self.map("bump_image", Encoding::Bump)?;
+        Some(NormalMap { map, scale: self.number("bump_strength").map_or(1.0, f64::from) })
+    }
+
+    /// Where an image of `d` is black the surface is not there.
+    fn cutout(&mut self) -> Option<Cutout> {
+        self.map("map_d", Encoding::Opacity).map(|map| Cutout { alpha: 1.0, map: Some(map), cutoff: Some(0.5) })
+    }
+
+    fn map(&mut self, key: &str, encoding: Encoding) -> Option<TextureMap> {
+        let material = self.material;
+        let name = match key {
+            "map_Kd" => material.diffuse_texture.as_ref(),
+            "map_d" => material.dissolve_texture.as_ref(),
+            _ => material.unknown_param.get(key),
+        };
+        // Exporters for Windows write its separator.
+        let path = self.path.parent().unwrap_or(Path::new("")).join(name?.replace('\\', "/"));
+        if self.files.exists(&path) {
+            // Exporters write anything for the colour beside an image.
+            let replaces_color = key == "map_Kd";
+            self.images.push(Image { source: ImageSource::File(path), encoding, replaces_color });
+            return Some(TextureMap::of(self.images.len() - 1));
+        }
+        let (key, instead) = match key {
+            "map_Kd" => (key, "; the colour is used"),
+            "bump_image" => ("map_Bump", "; left out"),
+            _ => (key, "; left out"),
+        };
+        self.remark(&format!("{key} {:?} does not exist{instead}", path.display().to_string()));
         None
     }
 

@@ -121,7 +121,7 @@ fn chosen(materials: &[Material], entry: Entry<'_>) -> Result<usize> {
 fn set_material(surface: &mut Surface, entry: Entry<'_>) -> Result<()> {
     match surface {
         Surface::Dielectric(glass) => {
-            let table = entry.table("material.NAME", &DIELECTRIC_KEYS[1..])?;
+            let table = entry.table("material.NAME", &DIELECTRIC_KEYS)?;
             if let Some(entry) = table.get("ior") {
                 match index_of(entry)? {
                     (ior, Dispersion::None) => glass.set_ior(ior),
@@ -138,9 +138,7 @@ fn set_material(surface: &mut Surface, entry: Entry<'_>) -> Result<()> {
             glass.priority = table.or("priority", glass.priority, |entry| entry.integer())?;
         }
         Surface::Opaque(opaque) => {
-            let keys: Vec<_> =
-                OPAQUE_KEYS.into_iter().filter(|key| !["kind", "base_color_texture"].contains(key)).collect();
-            let table = entry.table("material.NAME", &keys)?;
+            let table = entry.table("material.NAME", &OPAQUE_KEYS)?;
             if let Some(entry) = table.get("base_color") {
                 (opaque.base_color, opaque.base_color_texture) = (entry.triple(&UNIT)?, None);
             }
@@ -253,10 +251,10 @@ mod tests {
     #[test]
     fn what_was_changed_comes_back_bit_for_bit() {
         let mut before = built_in();
-        before.materials.push(Material { name: "a \"board\"".into(), surface: Surface::Opaque(Opaque::default()) });
+        before.materials.push(Material::new("a \"board\"".into(), Surface::Opaque(Opaque::default())));
         let bk7 = Glass::named("bk7").expect("a glass");
         let named = Dielectric { ior: bk7.ior, dispersion: bk7.dispersion, ..Dielectric::default() };
-        before.materials.push(Material { name: "named".into(), surface: Surface::Dielectric(named) });
+        before.materials.push(Material::new("named".into(), Surface::Dielectric(named)));
         let mut random = fastrand::Rng::with_seed(3);
         for _ in 0..200 {
             let mut now = before.clone();
@@ -299,7 +297,7 @@ mod tests {
     #[test]
     fn every_named_glass_comes_back_and_materials_whose_names_are_numbers() {
         let mut before = built_in();
-        let plain = Material { name: "2".into(), surface: Surface::Dielectric(Dielectric::default()) };
+        let plain = Material::new("2".into(), Surface::Dielectric(Dielectric::default()));
         before.materials = vec![Material { name: "1".into(), ..plain.clone() }, plain.clone(), plain.clone()];
         before.materials[2].name = "a\nb".into();
         for from in &GLASSES {

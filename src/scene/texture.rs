@@ -4,15 +4,15 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec4, Vec3};
 use half::f16;
 
 use super::files::Files;
 use super::mesh_file::{Image, ImageSource};
 use crate::Result;
-use crate::image::{self, Stored};
+use crate::image::{self, Numbers};
 
-/// An image that objects wear; row 0 is the top row, and it repeats in both directions.
+/// An image that objects wear; row 0 is the top row.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Texture {
     /// The file, for messages.
@@ -21,27 +21,79 @@ pub struct Texture {
     pub width: u32,
     /// Rows.
     pub height: u32,
-    /// Reflectance, row by row.
+    /// Reflectance or what else they stand for, row by row.
     pub texels: Texels,
 }
 
-/// Texels in the form that takes the least memory. The fourth channel is always 1: opaque surfaces let nothing through.
+/// Texels in the form that takes the least memory; the fourth channel is alpha.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Texels {
-    /// Encoded as sRGB, of an image with 8 bits a channel.
+    /// Colours encoded as sRGB, of an image with 8 bits a channel.
     Srgb(Vec<[u8; 4]>),
-    /// Linear Rec. 709 from 0 to 1, of any other image.
+    /// Numbers of such an image, 255 being 1.
+    Unorm(Vec<[u8; 4]>),
+    /// Linear Rec. 709, or numbers, from 0 to 1, of any other image.
     Linear(Vec<[f16; 4]>),
 }
 
+/// What the integers of an image stand for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Encoding {
+    /// Colours, encoded as sRGB.
+    Color,
+    /// Numbers, as they are.
+    Data,
+    /// Heights of a surface where an image is grey, else a map of its normals.
+    Bump,
+    /// How much of a surface is there; becomes alpha.
+    Opacity,
+}
+
 impl Texture {
-    /// The image at `path`, of these bytes; values that are no reflectance are moved to one and told in `warnings`.
-    pub fn decode(path: &Path, bytes: &[u8], warnings: &mut Vec<String>) -> Result<Self> {
-        let (width, height, texels) = match image::decode_stored(path, bytes)? {
-            Stored::Srgb { width, height, pixels } => {
-                (width, height, Texels::Srgb(pixels.into_iter().map(|[r, g, b]| [r, g, b, u8::MAX]).collect()))
+    /// The image at `path`, of these bytes; values that are not from 0 to 1 are moved there and told in `warnings`.
+    pub fn decode(path: &Path, bytes: &[u8], encoding: Encoding, warnings: &mut Vec<String>) -> Result<Self> {
+        let (width, height, texels) = match image::decode_numbers(path, bytes)? {
+            Numbers::Eight { width, height, pixels } => match encoding {
+                Encoding::Color => (width, height, Texels::Srgb(pixels)),
+                Encoding::Data => (width, height, Texels::Unorm(pixels)),
+                Encoding::Opacity => {
+                    let texel = |[r, _, _, a]: [u8; 4]| [255, 255, 255, (u16::from(r) * u16::from(a) / 255) as u8];
+                    (width, height, Texels::Unorm(pixels.into_iter().map(texel).collect()))
+                }
+                Encoding::Bump => {
+                    let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
+                    let unit = |[code, ..]: [u8; 4]| f32::from(code) / 255.0;
+                    let texels = match is_grey {
+                        true => Texels::Linear(normals(&pixels.into_iter().map(unit).collect::<Vec<_>>(), width)),
+                        false => Texels::Unorm(pixels),
+                    };
+                    (width, height, texels)
+                }
+            },
+            Numbers::Sixteen { width, height, pixels } => {
+                let unit = |code: u16| f64::from(code) / 65535.0;
+                let value = |code: u16| match encoding {
+                    Encoding::Color => f16::from_f32(image::from_srgb(unit(code))),
+                    Encoding::Data | Encoding::Bump | Encoding::Opacity => f16::from_f64(unit(code)),
+                };
+                let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
+                let texels = match encoding == Encoding::Bump && is_grey {
+                    true => {
+                        let heights: Vec<_> = pixels.iter().map(|[code, ..]| unit(*code) as f32).collect();
+                        normals(&heights, width)
+                    }
+                    false => {
+                        let alpha = |r: u16, a: u16| match encoding {
+                            Encoding::Opacity => unit(r) * unit(a),
+                            _ => unit(a),
+                        };
+                        let texel = |[r, g, b, a]: [u16; 4]| [value(r), value(g), value(b), f16::from_f64(alpha(r, a))];
+                        pixels.into_iter().map(texel).collect()
+                    }
+                };
+                (width, height, Texels::Linear(texels))
             }
-            Stored::Linear(image) => {
+            Numbers::Float(image) => {
                 let wrong = |pixel: &&[f32; 3]| !pixel.iter().all(|value| (0.0..=1.0).contains(value));
                 let count = image.pixels.iter().filter(wrong).count();
                 if count > 0 {
@@ -57,19 +109,22 @@ impl Texture {
         Ok(Self { path: path.into(), width, height, texels })
     }
 
-    /// Multiplies every texel.
-    fn scale(&mut self, factor: DVec3) {
-        let factor = factor.as_vec3().to_array();
-        let scaled = |[r, g, b]: [f32; 3]| {
-            let [x, y, z] = factor;
-            [f16::from_f32(r * x), f16::from_f32(g * y), f16::from_f32(b * z), f16::ONE]
-        };
-        self.texels = Texels::Linear(match &self.texels {
-            Texels::Srgb(texels) => {
-                texels.iter().map(|&[r, g, b, _]| scaled([r, g, b].map(image::decode_srgb))).collect()
-            }
-            Texels::Linear(texels) => texels.iter().map(|&[r, g, b, _]| scaled([r, g, b].map(f16::to_f32))).collect(),
-        });
+    /// Red, green, blue and alpha of each texel, linear.
+    pub fn linear(&self) -> Box<dyn Iterator<Item = [f32; 4]> + '_> {
+        match &self.texels {
+            Texels::Srgb(texels) => Box::new(texels.iter().map(|&[r, g, b, a]| {
+                let [r, g, b] = [r, g, b].map(image::decode_srgb);
+                [r, g, b, f32::from(a) / 255.0]
+            })),
+            Texels::Unorm(texels) => Box::new(texels.iter().map(|texel| texel.map(|code| f32::from(code) / 255.0))),
+            Texels::Linear(texels) => Box::new(texels.iter().map(|texel| texel.map(f16::to_f32))),
+        }
+    }
+
+    /// The mean of each channel.
+    pub fn mean(&self) -> DVec4 {
+        let sum: DVec4 = self.linear().map(|texel| DVec4::from_array(texel.map(f64::from))).sum();
+        sum / f64::from(self.width) / f64::from(self.height)
     }
 
     /// The file's name, for messages.
@@ -78,44 +133,48 @@ impl Texture {
     }
 }
 
+/// The normals of heights, of which 1 is as high as a texel is wide; encoded as in an image, which repeats.
+fn normals(heights: &[f32], width: u32) -> Vec<[f16; 4]> {
+    let width = width as usize;
+    let height = heights.len() / width;
+    let at = |x: usize, y: usize| heights[y % height * width + x % width];
+    let texel = |i: usize| {
+        let (x, y) = (i % width, i / width);
+        let along = (at(x + 1, y) - at(x + width - 1, y)) / 2.0;
+        let up = (at(x, y + height - 1) - at(x, y + 1)) / 2.0;
+        let [r, g, b] = Vec3::new(-along, -up, 1.0).normalize().to_array().map(|x| f16::from_f32(x.mul_add(0.5, 0.5)));
+        [r, g, b, f16::ONE]
+    };
+    (0..heights.len()).map(texel).collect()
+}
+
 fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
-
-/// What tells textures apart: the file, and the bits of its factor.
-type Key = (PathBuf, [u64; 3]);
 
 /// The textures so far.
 #[derive(Debug, Default)]
 pub struct Textures {
     /// In the order in which they were named first.
     pub all: Vec<Arc<Texture>>,
-    numbers: HashMap<Key, usize>,
+    numbers: HashMap<(PathBuf, Encoding), usize>,
 }
 
 impl Textures {
-    /// The number in [`Textures::all`] of the image at `path`, which is read unless it was before.
-    pub fn open(&mut self, files: Files, path: &Path, warnings: &mut Vec<String>) -> Result<usize> {
-        self.open_image(files, &Image::file(path.into()), warnings)
-    }
-
-    /// The same of an image that a mesh file names.
-    pub fn open_image(&mut self, files: Files, image: &Image, warnings: &mut Vec<String>) -> Result<usize> {
+    /// The number in [`Textures::all`] of an image, which is read unless it was before.
+    pub fn open(&mut self, files: Files, image: &Image, warnings: &mut Vec<String>) -> Result<usize> {
         let identity = match &image.source {
             ImageSource::File(path) => files.identity(path),
             ImageSource::Embedded { name, .. } => name.clone(),
         };
-        let key = (identity, image.factor.to_array().map(f64::to_bits));
+        let key = (identity, image.encoding);
         if let Some(&number) = self.numbers.get(&key) {
             return Ok(number);
         }
-        let mut texture = match &image.source {
-            ImageSource::File(path) => Texture::decode(path, &files.read(path)?, warnings)?,
-            ImageSource::Embedded { name, bytes } => Texture::decode(name, bytes, warnings)?,
+        let texture = match &image.source {
+            ImageSource::File(path) => Texture::decode(path, &files.read(path)?, image.encoding, warnings)?,
+            ImageSource::Embedded { name, bytes } => Texture::decode(name, bytes, image.encoding, warnings)?,
         };
-        if image.factor != DVec3::ONE {
-            texture.scale(image.factor);
-        }
         self.all.push(Arc::new(texture));
         self.numbers.insert(key, self.all.len() - 1);
         Ok(self.all.len() - 1)

@@ -6,7 +6,7 @@ use std::path::Path;
 use glam::DVec3;
 use vitrum::effects::Effect;
 use vitrum::options::Model;
-use vitrum::scene::{Dielectric, Dispersion, GLASSES, Opaque, Overrides, Scene, Surroundings};
+use vitrum::scene::{Dielectric, Dispersion, GLASSES, Opaque, Overrides, Scene, Surroundings, TextureMap};
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
@@ -91,17 +91,19 @@ fn everything_is_read() {
             attenuation_distance: 0.2,
             thin_walled: true,
             priority: -3,
+            ..Dielectric::default()
         }
     );
     assert_eq!(
         opaque(&scene, 1),
         &Opaque {
-            base_color: DVec3::splat(0.8),
-            base_color_texture: Some(0),
+            base_color: DVec3::ONE,
+            base_color_texture: Some(TextureMap::of(0)),
             metallic: 0.5,
             roughness: 0.75,
             specular: 0.125,
             emission: DVec3::new(0.0, 0.0, 12.0),
+            ..Opaque::default()
         }
     );
     assert_eq!((scene.textures.len(), &scene.textures[0].path), (1, &folder.path("sky.png")));
@@ -167,11 +169,11 @@ fn unknown_keys_list_the_allowed_ones() {
         ),
         (
             "[material.m]\nkind = \"dielectric\"\nroughnes = 1",
-            "3: unknown key \"roughnes\" in [material.m]; allowed here: kind, ior, roughness, dispersion, attenuation_color, attenuation_distance, thin_walled, priority",
+            "3: unknown key \"roughnes\" in [material.m]; allowed here: kind, ior, roughness, dispersion, attenuation_color, attenuation_distance, thin_walled, priority, base_color, transmission, transmission_texture, base_color_texture, metallic_roughness_texture, normal_texture, normal_scale, alpha_cutoff",
         ),
         (
             "[material.m]\nkind = \"opaque\"\nior = 1",
-            "3: unknown key \"ior\" in [material.m]; allowed here: kind, base_color, base_color_texture, metallic, roughness, specular, emission",
+            "3: unknown key \"ior\" in [material.m]; allowed here: kind, base_color, metallic, roughness, specular, emission, emission_texture, base_color_texture, metallic_roughness_texture, normal_texture, normal_scale, alpha_cutoff",
         ),
     ];
     for (text, expected) in cases {

@@ -3,7 +3,7 @@
 use std::fs;
 
 use glam::DVec3;
-use vitrum::scene::{Dielectric, Opaque, Overrides, Scene, Surface};
+use vitrum::scene::{Dielectric, Opaque, Overrides, Scene, Surface, TextureMap};
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
@@ -243,12 +243,13 @@ fn mtl_values_are_converted_or_remarked_on() {
     let scene = with_mtl(&folder, "Kd 0.5\nPm 1\nPr 0.25\nKe 1 2 3\nmap_Kd -s 1 1 1 -clamp on tex\\my sky.png");
     assert_eq!(scene.textures[0].path, folder.path("tex/my sky.png"));
     let expected = Opaque {
-        base_color: DVec3::splat(0.5),
-        base_color_texture: Some(0),
+        base_color: DVec3::ONE,
+        base_color_texture: Some(TextureMap::of(0)),
         metallic: 1.0,
         roughness: 0.25,
         specular: 1.0,
         emission: DVec3::new(1.0, 2.0, 3.0),
+        ..Opaque::default()
     };
     assert_eq!((opaque(&scene, 0), scene.warnings.len()), (&expected, 0));
 

@@ -4,7 +4,7 @@ use glam::{DAffine3, DVec3};
 use half::f16;
 
 use vitrum::options::Size;
-use vitrum::scene::{Environment, Object, Opaque, Panorama, Scene, Surface, Surroundings, Texels, Texture};
+use vitrum::scene::{Environment, Object, Opaque, Panorama, Scene, Surface, Surroundings, Texels, Texture, TextureMap};
 
 use crate::bodies::{ball, built_in, diamond, hollow, in_the_city, in_white, made_prism, pane, slab};
 use crate::device::{Device, Picture, Shot};
@@ -37,7 +37,12 @@ fn in_squares(scene: Scene) -> Scene {
 fn board() -> Scene {
     let texels = squares(512, 512, 4).map(|value| [f16::from_f32(0.5 * value); 4]).collect();
     let texture = Texture { path: "squares".into(), width: 512, height: 512, texels: Texels::Linear(texels) };
-    let worn = Opaque { base_color_texture: Some(0), specular: 0.0, ..Opaque::default() };
+    let worn = Opaque {
+        base_color: DVec3::ONE,
+        base_color_texture: Some(TextureMap::of(0)),
+        specular: 0.0,
+        ..Opaque::default()
+    };
     let mut board = rectangle(4.0, 4.0);
     board.uvs = board.positions.iter().map(|&[x, y, _]| [x / 4.0, y / 4.0]).collect();
     let tilt = DAffine3::from_rotation_x(-1.1);

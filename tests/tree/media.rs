@@ -90,7 +90,7 @@ fn three_in_a_glass() -> Scene {
     let mut scene = water_in_a_glass();
     let ice = Part::of(icosphere(3), of_priority(0, 1.31));
     scene.meshes.push(ice.mesh.into());
-    scene.materials.push(vitrum::scene::Material { name: "ice".into(), surface: ice.surface });
+    scene.materials.push(vitrum::scene::Material::new("ice".into(), ice.surface));
     let transform = DAffine3::from_translation(DVec3::Y * 0.35) * scaled(0.35);
     scene.objects.push(vitrum::scene::Object { mesh: 2, material: 2, number: 2, transform, smooth: true });
     scene

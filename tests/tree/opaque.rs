@@ -6,7 +6,7 @@ use glam::{DAffine3, DVec3};
 use half::f16;
 
 use vitrum::options::Size;
-use vitrum::scene::{Camera, Dielectric, Dispersion, Opaque, PointLight, Scene, Surface, Texels, Texture};
+use vitrum::scene::{Camera, Dielectric, Dispersion, Opaque, PointLight, Scene, Surface, Texels, Texture, TextureMap};
 
 use crate::bodies::in_white;
 use crate::device::{Device, Picture, Shot};
@@ -113,7 +113,12 @@ fn in_white_light_a_board_has_its_colour_a_mirror_mirrors_and_lamps_shine() {
     let mut textured = rectangle(3.0, 3.0);
     // Its left half, from the middle of one texel to the other and farther.
     textured.uvs = textured.positions.iter().map(|&[x, _, _]| [0.25 + 5.0 * x, 0.5]).collect();
-    let worn = Opaque { base_color_texture: Some(0), specular: 0.0, ..Opaque::default() };
+    let worn = Opaque {
+        base_color: DVec3::ONE,
+        base_color_texture: Some(TextureMap::of(0)),
+        specular: 0.0,
+        ..Opaque::default()
+    };
     let image = Scene {
         textures: vec![texture.into()],
         ..in_the_dark([Part::of(textured, Surface::Opaque(worn))], Vec::new())

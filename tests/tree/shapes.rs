@@ -75,7 +75,7 @@ pub fn scene(parts: impl IntoIterator<Item = Part>) -> Scene {
     };
     for (number, Part { mesh, surface, transform, smooth }) in parts.into_iter().enumerate() {
         scene.meshes.push(mesh.into());
-        scene.materials.push(Material { name: format!("material {number}"), surface });
+        scene.materials.push(Material::new(format!("material {number}"), surface));
         scene.objects.push(Object { mesh: number, material: number, number, transform, smooth });
     }
     scene

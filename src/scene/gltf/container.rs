@@ -8,11 +8,9 @@ use std::sync::Arc;
 
 use base64::Engine;
 use base64::engine::general_purpose::STANDARD;
-use glam::DVec3;
 use gltf::buffer;
 use percent_encoding::percent_decode_str;
 
-use crate::image::{self, Stored};
 use crate::scene::files::Files;
 use crate::scene::mesh_file::ImageSource;
 use crate::{Error, Result};
@@ -137,25 +135,6 @@ impl Resources<'_> {
             },
             (None, None) => Err("it has neither bytes nor a file".into()),
         }
-    }
-
-    /// The mean of each channel of an image, 8 bits being taken as sRGB or as linear.
-    pub fn mean(&self, source: &ImageSource, is_srgb: bool) -> Result<DVec3, String> {
-        let decoded = match source {
-            ImageSource::File(path) => self.files.read(path).and_then(|bytes| image::decode_stored(path, &bytes)),
-            ImageSource::Embedded { name, bytes } => image::decode_stored(name, bytes),
-        };
-        let wide = |pixel: [f32; 3]| DVec3::from_array(pixel.map(f64::from));
-        let (sum, count) = match decoded.map_err(|error| error.in_full())? {
-            Stored::Srgb { pixels, .. } if is_srgb => {
-                (pixels.iter().map(|pixel| wide(pixel.map(image::decode_srgb))).sum::<DVec3>(), pixels.len())
-            }
-            Stored::Srgb { pixels, .. } => {
-                (pixels.iter().map(|pixel| wide(pixel.map(f32::from)) / 255.0).sum(), pixels.len())
-            }
-            Stored::Linear(image) => (image.pixels.iter().map(|&pixel| wide(pixel)).sum(), image.pixels.len()),
-        };
-        Ok((sum / count.max(1) as f64).clamp(DVec3::ZERO, DVec3::ONE))
     }
 
     /// The file that a relative URI names.

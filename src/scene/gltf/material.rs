@@ -2,46 +2,37 @@
 //!
 //! | glTF | becomes |
 //! | --- | --- |
-//! | `transmissionFactor` of at least a half, of what is no metal | a dielectric, else opaque |
+//! | `transmissionFactor` above 0, of what is no metal | a dielectric, else opaque |
+//! | `transmissionFactor`, `transmissionTexture`, `metallicFactor`, `baseColorFactor`, `baseColorTexture` of a dielectric | its coating |
 //! | `thicknessFactor` 0, or none | `thin_walled` |
-//! | `ior`; none: 1.5 | index of a dielectric; strength of the specular reflection of an opaque surface |
+//! | `ior`; none: 1.5 | index of both |
 //! | `dispersion`, `attenuationColor`, `attenuationDistance` | the same of a dielectric |
-//! | `roughnessFactor`, `metallicFactor`, `specularFactor` | the same |
+//! | `roughnessFactor`, `metallicFactor`, `metallicRoughnessTexture`, `specularFactor` | the same |
 //! | `baseColorFactor`, `baseColorTexture` | base colour, and an image that is multiplied by it |
-//! | `emissiveFactor`, `emissiveStrength` | their product is the emission: a nit counts as 1 W/(m^2 sr) |
+//! | `emissiveFactor`, `emissiveTexture`, `emissiveStrength` | their product is the emission: a nit counts as 1 W/(m^2 sr) |
 //! | `unlit` | the base colour is sent out |
+//! | `normalTexture` | a map of normals |
+//! | `alphaMode`, `alphaCutoff` | where the surface is not there |
 
 use std::collections::HashMap;
 
 use glam::{DMat2, DVec2, DVec3};
 use gltf::Document;
+use gltf::json::extensions::texture::{
+    TextureTransform, TextureTransformOffset, TextureTransformRotation, TextureTransformScale,
+};
 use gltf::material::{AlphaMode, Material as Source};
 use gltf::texture::{Info, Texture, WrappingMode};
 
 use super::Remarks;
 use super::container::{Bytes, Resources};
 use crate::scene::mesh_file::{Image, ImageSource};
-use crate::scene::{Dielectric, Dispersion, Material, Opaque, Surface};
+use crate::scene::{
+    Coating, Cutout, Dielectric, Dispersion, Encoding, Material, NormalMap, Opaque, Surface, TextureMap, Wrap,
+};
 
-/// What KHR_materials_specular scales: the reflectance of an index of 1.5.
-const REFLECTANCE: f64 = 0.04;
-
-/// The image of a material's base colour, as its meshes have to know it.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Coordinates {
-    /// The number of the set of texture coordinates.
-    pub set: u32,
-    /// Scales, rotates and moves them, as KHR_texture_transform has it.
-    pub turn: DMat2,
-    /// After the turn.
-    pub offset: DVec2,
-}
-
-impl Default for Coordinates {
-    fn default() -> Self {
-        Self { set: 0, turn: DMat2::IDENTITY, offset: DVec2::ZERO }
-    }
-}
+/// An index as high as those of KHR_materials_ior's 0, which stands for one without end.
+const ENDLESS: f64 = 1e6;
 
 /// Converts materials, one after the other.
 pub struct Converter<'a> {
@@ -51,11 +42,11 @@ pub struct Converter<'a> {
     remarks: &'a mut Remarks,
     /// The images of all that were converted.
     pub images: Vec<Image>,
-    /// Where in [`Converter::images`] an image is, multiplied by the factor of these bits.
-    numbers: HashMap<(usize, [u64; 3]), usize>,
+    /// Where in [`Converter::images`] an image is.
+    numbers: HashMap<(usize, Encoding), usize>,
     sources: HashMap<usize, Result<ImageSource, String>>,
-    /// Of images the means of their channels, by what 8 bits stand for.
-    means: HashMap<(usize, bool), Result<DVec3, String>>,
+    /// The set of texture coordinates that the material's images use so far.
+    set: Option<u32>,
 }
 
 impl<'a> Converter<'a> {
@@ -66,51 +57,81 @@ impl<'a> Converter<'a> {
         buffers: &'a [Bytes<'a>],
         remarks: &'a mut Remarks,
     ) -> Self {
-        let (images, numbers, sources, means) = (Vec::new(), HashMap::new(), HashMap::new(), HashMap::new());
-        Self { document, resources, buffers, remarks, images, numbers, sources, means }
+        let (images, numbers, sources) = (Vec::new(), HashMap::new(), HashMap::new());
+        Self { document, resources, buffers, remarks, images, numbers, sources, set: None }
     }
 
-    /// The material, and how its image lies on meshes.
-    pub fn convert(&mut self, source: &Source<'_>) -> (Material, Option<Coordinates>) {
+    /// The material, and the set of texture coordinates that its images use.
+    pub fn convert(&mut self, source: &Source<'_>) -> (Material, u32) {
+        self.set = None;
         let index = source.index().unwrap_or(0);
         let name = source.name().map_or_else(|| format!("material {index}"), str::to_owned);
         let pbr = source.pbr_metallic_roughness();
-        if source.unlit() {
-            return (Material { surface: Surface::Opaque(self.unlit(source, &name)), name }, None);
-        }
-        self.left_out(source);
-        // Green is roughness, blue is metal.
-        let map = pbr.metallic_roughness_texture();
-        let map =
-            map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), false, "metallic-roughness textures", &name));
-        let metallic = map.z * self.within(&name, "metallicFactor", pbr.metallic_factor(), 0.0, 1.0);
-        let roughness = map.y * self.within(&name, "roughnessFactor", pbr.roughness_factor(), 0.0, 1.0);
-        let transmission = source.transmission().map_or(0.0, |transmission| {
-            let map = transmission.transmission_texture();
-            let map = map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), false, "transmission textures", &name));
-            map.x * f64::from(transmission.transmission_factor())
+        let color_map = pbr.base_color_texture().and_then(|info| self.map(&info, Encoding::Color, &name));
+        let surface = if source.unlit() {
+            Surface::Opaque(self.unlit(source, color_map, &name))
+        } else {
+            self.left_out(source);
+            let metallic = self.within(&name, "metallicFactor", pbr.metallic_factor(), 0.0, 1.0);
+            let roughness = self.within(&name, "roughnessFactor", pbr.roughness_factor(), 0.0, 1.0);
+            let map = pbr.metallic_roughness_texture();
+            let map = map.and_then(|info| self.map(&info, Encoding::Data, &name));
+            let transmission = source.transmission().map_or(0.0, |transmission| transmission.transmission_factor());
+            let transmission = self.within(&name, "transmissionFactor", transmission, 0.0, 1.0);
+            // Where metal is everywhere nothing gets through.
+            let lets_through = transmission > 0.0 && (metallic < 1.0 || map.is_some());
+            let common = Common { metallic, roughness, map, color_map, transmission };
+            match lets_through {
+                true => Surface::Dielectric(self.dielectric(source, &name, &common)),
+                false => Surface::Opaque(self.opaque(source, &name, &common)),
+            }
+        };
+        let normal_map = source.normal_texture().filter(|_| !source.unlit()).and_then(|normal| {
+            let set = normal.tex_coord();
+            // The crate leaves this one as JSON.
+            let transform = normal.extension_value("KHR_texture_transform").cloned();
+            let transform = transform.and_then(|json| serde_json::from_value(json).ok());
+            let map = self.place(&normal.texture(), set, transform, Encoding::Data, &name)?;
+            Some(NormalMap { map, scale: f64::from(normal.scale()) })
         });
-        let through = transmission * (1.0 - metallic);
-        if through > 0.0 && through < 1.0 {
-            let shown = if through < 0.5 { "opaque" } else { "a dielectric" };
-            self.remarks
-                .say(format!("material {name:?}: lets {through:.2} of the light through and is shown as {shown}"));
-        }
-        if through >= 0.5 {
-            return (Material { surface: Surface::Dielectric(self.dielectric(source, &name, roughness)), name }, None);
-        }
-        let (opaque, coordinates) = self.opaque(source, &name, metallic, roughness);
-        (Material { surface: Surface::Opaque(opaque), name }, coordinates)
+        let [.., alpha] = pbr.base_color_factor();
+        let alpha = self.within(&name, "the alpha of baseColorFactor", alpha, 0.0, 1.0);
+        let cutout = match source.alpha_mode() {
+            AlphaMode::Opaque => None,
+            AlphaMode::Mask => {
+                let cutoff = source.alpha_cutoff().unwrap_or(0.5);
+                Some(Cutout {
+                    alpha,
+                    map: color_map,
+                    cutoff: Some(self.within(&name, "alphaCutoff", cutoff, 0.0, 1e9)),
+                })
+            }
+            AlphaMode::Blend => Some(Cutout { alpha, map: color_map, cutoff: None }),
+        };
+        // Most files with BLEND have nothing to blend.
+        let cutout = cutout.filter(|cutout| cutout.alpha < 1.0 || cutout.map.is_some());
+        (Material { name, surface, normal_map, cutout }, self.set.unwrap_or(0))
     }
 
-    fn dielectric(&mut self, source: &Source<'_>, name: &str, roughness: f64) -> Dielectric {
+    fn dielectric(&mut self, source: &Source<'_>, name: &str, common: &Common) -> Dielectric {
         let clear = Dielectric::default();
         let pbr = source.pbr_metallic_roughness();
         let volume = source.volume();
         let thick = volume.as_ref().map_or(0.0, |volume| volume.thickness_factor());
         let [r, g, b, _] = pbr.base_color_factor();
-        if [r, g, b] != [1.0; 3] || pbr.base_color_texture().is_some() {
-            self.remarks.leave_out("the base colour of dielectrics (attenuationColor colours them)");
+        let transmission_texture = source.transmission().and_then(|transmission| transmission.transmission_texture());
+        let coating = Coating {
+            base_color: self.color(name, "baseColorFactor", [r, g, b], 1.0),
+            base_color_texture: common.color_map,
+            transmission: common.transmission,
+            transmission_texture: transmission_texture.and_then(|info| self.map(&info, Encoding::Data, name)),
+            metallic: common.metallic,
+        };
+        if source.emissive_factor() != [0.0; 3] {
+            self.remarks.leave_out("emission of dielectrics");
+        }
+        if source.specular().is_some_and(|specular| specular.specular_factor() != 1.0) {
+            self.remarks.leave_out("specularFactor of dielectrics (their index tells what they reflect)");
         }
         let (attenuation_color, attenuation_distance) = match volume {
             Some(volume) => {
@@ -138,85 +159,109 @@ impl<'a> Converter<'a> {
             .map_or(0.0, |number| self.within(name, "dispersion", number as f32, 0.0, 1e9));
         Dielectric {
             ior,
-            roughness,
+            roughness: common.roughness,
             dispersion: if dispersion > 0.0 { Dispersion::Khr(dispersion) } else { Dispersion::None },
             attenuation_color,
             attenuation_distance,
             thin_walled: thick <= 0.0,
             priority: clear.priority,
+            metallic_roughness_texture: common.map,
+            coating: (coating != Coating::default()).then(|| Box::new(coating)),
         }
     }
 
     /// What sends its colour out, whatever shines on it.
-    fn unlit(&mut self, source: &Source<'_>, name: &str) -> Opaque {
-        let pbr = source.pbr_metallic_roughness();
-        let [r, g, b, _] = pbr.base_color_factor();
-        let map = pbr.base_color_texture();
-        let what = "base colour textures of unlit materials";
-        let map = map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), true, what, name));
-        let emission = map * self.color(name, "baseColorFactor", [r, g, b], 1.0);
-        Opaque { base_color: DVec3::ZERO, specular: 0.0, emission, ..Opaque::default() }
+    fn unlit(&mut self, source: &Source<'_>, color_map: Option<TextureMap>, name: &str) -> Opaque {
+        let [r, g, b, _] = source.pbr_metallic_roughness().base_color_factor();
+        let emission = self.color(name, "baseColorFactor", [r, g, b], 1.0);
+        let nothing = Opaque { base_color: DVec3::ZERO, specular: 0.0, ..Opaque::default() };
+        Opaque { emission, emission_texture: color_map, ..nothing }
     }
 
-    fn opaque(
-        &mut self,
-        source: &Source<'_>,
-        name: &str,
-        metallic: f64,
-        roughness: f64,
-    ) -> (Opaque, Option<Coordinates>) {
+    fn opaque(&mut self, source: &Source<'_>, name: &str, common: &Common) -> Opaque {
         let pbr = source.pbr_metallic_roughness();
         let [r, g, b, _] = pbr.base_color_factor();
         let base_color = self.color(name, "baseColorFactor", [r, g, b], 1.0);
-        let map = source.emissive_texture();
-        let map = map.map_or(DVec3::ONE, |info| self.mean(&info.texture(), true, "emissive textures", name));
+        let emission_texture = source.emissive_texture();
         let strength = source.emissive_strength().unwrap_or(1.0);
-        let emissive = source.emissive_factor().map(|channel| channel * strength);
-        let emission = map * self.color(name, "emissiveFactor", emissive, 1e9);
-        let mut specular = source.specular().map_or(1.0, |specular| f64::from(specular.specular_factor()));
-        // 0 stands for an index without end, for materials that come from another workflow.
-        if let Some(ior) = source.ior().filter(|ior| *ior > 0.0) {
-            let ior = f64::from(ior);
-            specular *= ((ior - 1.0) / (ior + 1.0)).powi(2) / REFLECTANCE;
-        }
-        let (texture, coordinates) = pbr.base_color_texture().map(|info| self.texture(&info, base_color, name)).unzip();
-        let opaque = Opaque {
-            base_color,
-            base_color_texture: texture.flatten(),
-            metallic,
-            roughness,
-            specular: self.within(name, "the strength of the specular reflection", specular as f32, 0.0, 1.0),
-            emission,
+        let emission = source.emissive_factor().map(|channel| channel * strength);
+        let specular = source.specular().map_or(1.0, |specular| specular.specular_factor());
+        let ior = match source.ior() {
+            None => Opaque::default().ior,
+            Some(0.0) => ENDLESS,
+            Some(ior) => self.within(name, "ior", ior, 1.0, ENDLESS),
         };
-        (opaque, coordinates)
+        Opaque {
+            base_color,
+            base_color_texture: common.color_map,
+            metallic: common.metallic,
+            roughness: common.roughness,
+            metallic_roughness_texture: common.map,
+            ior,
+            specular: self.within(name, "specularFactor", specular, 0.0, 1.0),
+            emission: self.color(name, "emissiveFactor times emissiveStrength", emission, 1e9),
+            emission_texture: emission_texture.and_then(|info| self.map(&info, Encoding::Color, name)),
+        }
     }
 
-    /// The number of an image, and how it lies on meshes.
-    fn texture(&mut self, info: &Info<'_>, factor: DVec3, name: &str) -> (Option<usize>, Coordinates) {
-        let transform = info.texture_transform();
-        let set = transform.as_ref().and_then(|transform| transform.tex_coord()).unwrap_or(info.tex_coord());
-        let coordinates = match transform {
-            None => Coordinates { set, ..Coordinates::default() },
+    /// An image as a material wears it.
+    fn map(&mut self, info: &Info<'_>, encoding: Encoding, name: &str) -> Option<TextureMap> {
+        let transform = info.texture_transform().map(|transform| TextureTransform {
+            offset: TextureTransformOffset(transform.offset()),
+            rotation: TextureTransformRotation(transform.rotation()),
+            scale: TextureTransformScale(transform.scale()),
+            tex_coord: transform.tex_coord(),
+            ..TextureTransform::default()
+        });
+        self.place(&info.texture(), info.tex_coord(), transform, encoding, name)
+    }
+
+    fn place(
+        &mut self,
+        texture: &Texture<'_>,
+        set: u32,
+        transform: Option<TextureTransform>,
+        encoding: Encoding,
+        name: &str,
+    ) -> Option<TextureMap> {
+        let set = transform.as_ref().and_then(|transform| transform.tex_coord).unwrap_or(set);
+        if *self.set.get_or_insert(set) != set {
+            self.remarks.leave_out("images on a second set of texture coordinates");
+            return None;
+        }
+        let (turn, offset) = match transform {
+            None => (DMat2::IDENTITY, DVec2::ZERO),
             Some(transform) => {
-                let (sine, cosine) = f64::from(transform.rotation()).sin_cos();
-                let [u, v] = transform.scale().map(f64::from);
+                let (sine, cosine) = f64::from(transform.rotation.0).sin_cos();
+                let [u, v] = transform.scale.0.map(f64::from);
                 // Counter-clockwise, v being downwards.
                 let turn = DMat2::from_cols_array(&[u * cosine, -u * sine, v * sine, v * cosine]);
-                Coordinates { set, turn, offset: DVec2::from_array(transform.offset().map(f64::from)) }
+                (turn, DVec2::from_array(transform.offset.0.map(f64::from)))
             }
         };
-        match self.source(&info.texture()) {
+        let is_near = |x: f64| x.abs() <= 1e9;
+        if !(turn.to_cols_array().into_iter().all(is_near) && offset.to_array().into_iter().all(is_near)) {
+            self.remarks.say(format!("material {name:?}: KHR_texture_transform is beyond 1e9; the image is left out"));
+            return None;
+        }
+        let sampler = texture.sampler();
+        let wrap = [sampler.wrap_s(), sampler.wrap_t()].map(|mode| match mode {
+            WrappingMode::ClampToEdge => Wrap::Clamp,
+            WrappingMode::MirroredRepeat => Wrap::Mirror,
+            WrappingMode::Repeat => Wrap::Repeat,
+        });
+        match self.source(texture) {
             Ok((number, source)) => {
                 let images = &mut self.images;
-                let number = *self.numbers.entry((number, factor.to_array().map(f64::to_bits))).or_insert_with(|| {
-                    images.push(Image { source, factor });
+                let texture = *self.numbers.entry((number, encoding)).or_insert_with(|| {
+                    images.push(Image { source, encoding, replaces_color: false });
                     images.len() - 1
                 });
-                (Some(number), coordinates)
+                Some(TextureMap { texture, turn, offset, wrap })
             }
             Err(why) => {
-                self.remarks.say(format!("material {name:?}: its image cannot be read, and its colour is used: {why}"));
-                (None, coordinates)
+                self.remarks.say(format!("material {name:?}: an image cannot be read, and is left out: {why}"));
+                None
             }
         }
     }
@@ -229,20 +274,6 @@ impl<'a> Converter<'a> {
         self.sources.entry(number).or_insert_with(find).clone().map(|source| (number, source))
     }
 
-    /// The mean of an image that is not looked at more closely, of 8 bits a channel as sRGB or linear.
-    fn mean(&mut self, texture: &Texture<'_>, is_srgb: bool, what: &str, name: &str) -> DVec3 {
-        self.remarks.leave_out(format!("{what} (their mean is used)"));
-        let (resources, source) = (self.resources, self.source(texture));
-        let mean = source.and_then(|(number, source)| {
-            let find = || resources.mean(&source, is_srgb);
-            self.means.entry((number, is_srgb)).or_insert_with(find).clone()
-        });
-        mean.unwrap_or_else(|why| {
-            self.remarks.say(format!("material {name:?}: an image cannot be read, and counts as white: {why}"));
-            DVec3::ONE
-        })
-    }
-
     /// Notes what a material says and does not get.
     fn left_out(&mut self, source: &Source<'_>) {
         let thickness = source.volume().and_then(|volume| volume.thickness_texture());
@@ -251,18 +282,11 @@ impl<'a> Converter<'a> {
             specular.specular_texture().is_some() || specular.specular_color_texture().is_some()
         });
         let tints = specular.is_some_and(|specular| specular.specular_color_factor() != [1.0; 3]);
-        let wraps = source.pbr_metallic_roughness().base_color_texture().is_some_and(|info| {
-            let sampler = info.texture().sampler();
-            [sampler.wrap_s(), sampler.wrap_t()] != [WrappingMode::Repeat; 2]
-        });
         for (is, what) in [
-            (source.normal_texture().is_some(), "normal maps"),
             (source.occlusion_texture().is_some(), "occlusion textures"),
             (thickness.is_some(), "thickness textures (the mesh has its own thickness)"),
             (specular_maps, "specular textures"),
             (tints, "specular colours"),
-            (source.alpha_mode() != AlphaMode::Opaque, "alpha (mask and blend)"),
-            (wraps, "wrapping of textures other than REPEAT"),
         ] {
             if is {
                 self.remarks.leave_out(what);
@@ -284,4 +308,13 @@ impl<'a> Converter<'a> {
         }
         used
     }
+}
+
+/// What materials of both kinds have.
+struct Common {
+    metallic: f64,
+    roughness: f64,
+    map: Option<TextureMap>,
+    color_map: Option<TextureMap>,
+    transmission: f64,
 }

@@ -3,24 +3,22 @@
 use std::collections::HashMap;
 use std::rc::Rc;
 
-use glam::DVec2;
 use gltf::mesh::{Mode, Primitive, Semantic};
 use gltf::{Accessor, Mesh as Source};
 
 use super::Remarks;
 use super::accessor::Accessors;
-use super::material::Coordinates;
 use crate::scene::mesh::{Mesh, RawMesh, Refusal};
 
 /// How many indices are read at most for each byte of the buffers.
 const MOST_SHARED: usize = 4;
 
-/// What a primitive is made of: accessors, how its corners make triangles, and how its image lies.
+/// What a primitive is made of: accessors, and how its corners make triangles.
 #[derive(Clone, Debug, PartialEq, Eq, Hash)]
 struct Recipe {
     positions: usize,
     normals: Option<usize>,
-    coordinates: Option<(usize, [u64; 6])>,
+    coordinates: Option<usize>,
     indices: Option<usize>,
     mode: u32,
 }
@@ -28,8 +26,8 @@ struct Recipe {
 /// The meshes of a file so far.
 pub struct Meshes<'a> {
     accessors: &'a Accessors<'a>,
-    /// Of each material, how its image lies on meshes.
-    coordinates: &'a [Option<Coordinates>],
+    /// Of each material the number of the set of texture coordinates that its images use.
+    sets: &'a [u32],
     file: &'a str,
     several: bool,
     remarks: &'a mut Remarks,
@@ -50,7 +48,7 @@ impl<'a> Meshes<'a> {
     /// None yet.
     pub fn new(
         accessors: &'a Accessors<'a>,
-        coordinates: &'a [Option<Coordinates>],
+        sets: &'a [u32],
         file: &'a str,
         several: bool,
         repair: bool,
@@ -59,7 +57,7 @@ impl<'a> Meshes<'a> {
         let indices_left = MOST_SHARED * accessors.bytes() + (1 << 20);
         Self {
             accessors,
-            coordinates,
+            sets,
             file,
             several,
             remarks,
@@ -97,8 +95,8 @@ impl<'a> Meshes<'a> {
         let mut parts = Vec::new();
         let cut = by_material.len() > 1;
         for (material, primitives) in by_material {
-            let coordinates = material.and_then(|material| self.coordinates[material]);
-            let recipes: Result<Vec<_>, _> = primitives.iter().map(|one| recipe(one, coordinates)).collect();
+            let set = material.map_or(0, |material| self.sets[material]);
+            let recipes: Result<Vec<_>, _> = primitives.iter().map(|one| recipe(one, set)).collect();
             let recipes = recipes.map_err(|why| format!("mesh {}: {why}", source.index()))?;
             let mesh = match self.known.get(&recipes) {
                 Some(&known) => known,
@@ -110,7 +108,7 @@ impl<'a> Meshes<'a> {
                         let wears = wears.map_or(String::new(), |name| format!(", {name}"));
                         name = format!("{name} ({own}{wears})");
                     }
-                    let made = self.mesh(name, &primitives, coordinates);
+                    let made = self.mesh(name, &primitives, set);
                     let made = made.map_err(|why| format!("mesh {}: {why}", source.index()))?;
                     self.known.insert(recipes, made);
                     made
@@ -123,15 +121,9 @@ impl<'a> Meshes<'a> {
     }
 
     /// One mesh of several primitives, unless nothing of it has an area.
-    fn mesh(
-        &mut self,
-        name: String,
-        primitives: &[Primitive<'_>],
-        coordinates: Option<Coordinates>,
-    ) -> Result<Option<usize>, String> {
+    fn mesh(&mut self, name: String, primitives: &[Primitive<'_>], set: u32) -> Result<Option<usize>, String> {
         let mut raw = RawMesh { name, ..RawMesh::default() };
         let has_normals = primitives.iter().any(|primitive| primitive.get(&Semantic::Normals).is_some());
-        let set = coordinates.map_or(0, |coordinates| coordinates.set);
         let has_uvs = primitives.iter().any(|primitive| primitive.get(&Semantic::TexCoords(set)).is_some());
         for primitive in primitives {
             let positions = match primitive.get(&Semantic::Positions) {
@@ -175,7 +167,7 @@ impl<'a> Meshes<'a> {
                     Some(accessor) => {
                         let uvs = self.uvs(&accessor)?;
                         same("texture coordinates", uvs.len())?;
-                        raw.uvs.extend(used.of(&uvs).map(|uv| upward(uv, coordinates)));
+                        raw.uvs.extend(used.of(&uvs).map(|[u, v]| [u, 1.0 - v]));
                     }
                     None => raw.uvs.resize(raw.positions.len(), [f32::NAN; 2]),
                 }
@@ -216,25 +208,15 @@ impl<'a> Meshes<'a> {
     }
 }
 
-fn recipe(primitive: &Primitive<'_>, coordinates: Option<Coordinates>) -> Result<Recipe, String> {
+fn recipe(primitive: &Primitive<'_>, set: u32) -> Result<Recipe, String> {
     let of = |semantic: Semantic| primitive.get(&semantic).map(|accessor| accessor.index());
-    let lies = coordinates.unwrap_or_default();
-    let [[a, b], [c, d]] = lies.turn.to_cols_array_2d();
-    let numbers = [a, b, c, d, lies.offset.x, lies.offset.y].map(f64::to_bits);
     Ok(Recipe {
         positions: of(Semantic::Positions).ok_or("a primitive has no positions")?,
         normals: of(Semantic::Normals),
-        coordinates: of(Semantic::TexCoords(lies.set)).map(|accessor| (accessor, numbers)),
+        coordinates: of(Semantic::TexCoords(set)),
         indices: primitive.indices().map(|accessor| accessor.index()),
         mode: primitive.mode().as_gl_enum(),
     })
-}
-
-/// As OBJ has them, v upwards, after what KHR_texture_transform says.
-fn upward([u, v]: [f32; 2], coordinates: Option<Coordinates>) -> [f32; 2] {
-    let Some(Coordinates { turn, offset, .. }) = coordinates else { return [u, 1.0 - v] };
-    let DVec2 { x, y } = turn * DVec2::new(u.into(), v.into()) + offset;
-    [x as f32, (1.0 - y) as f32]
 }
 
 /// The triangles that corners make.

@@ -102,15 +102,15 @@ pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     let mut converter = Converter::new(&document, &resources, &buffers, &mut of_materials);
     let convert = |material: gltf::Material<'_>| match material.index().is_some_and(|own| worn_here.contains(&own)) {
         true => converter.convert(&material),
-        false => (Material::clear_glass(), None),
+        false => (Material::clear_glass(), 0),
     };
-    let (materials, coordinates): (Vec<_>, Vec<_>) = document.materials().map(convert).unzip();
+    let (materials, sets): (Vec<_>, Vec<_>) = document.materials().map(convert).unzip();
     let images = converter.images;
 
     let mut remarks = Remarks::default();
     leave_out(&document, &mut remarks);
     let accessors = Accessors::new(&buffers);
-    let mut meshes = Meshes::new(&accessors, &coordinates, &file, document.meshes().len() > 1, repair, &mut remarks);
+    let mut meshes = Meshes::new(&accessors, &sets, &file, document.meshes().len() > 1, repair, &mut remarks);
     let mut scene = SceneParts::default();
     for node in roots(&document) {
         scene.add(&node, &mut meshes).map_err(wrong)?;
