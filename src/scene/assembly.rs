@@ -1,8 +1,8 @@
 //! Puts meshes in their places. In flow mesh files and where they stand, out flow meshes, objects and the materials
 //! and textures that the files bring along; a file is read once, however many objects show it.
 
-use std::collections::HashMap;
 use std::collections::hash_map::Entry;
+use std::collections::{HashMap, HashSet};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -24,6 +24,8 @@ pub struct Assembly {
     pub materials: Vec<Material>,
     pub textures: Textures,
     pub warnings: Vec<String>,
+    /// Materials that a scene file says of whether they are panes.
+    pub decided: HashSet<usize>,
     /// Meshes are mended beyond what [`Mesh::new`] does.
     repair: bool,
     read: HashMap<PathBuf, Loaded>,

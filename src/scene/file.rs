@@ -169,6 +169,9 @@ impl Reader<'_> {
             Kind::Opaque => (&OPAQUE_KEYS, &["emission_texture"]),
         };
         let table = entry.table(&name, &[&["kind"], own, others, &MAP_KEYS].concat())?;
+        if table.get("thin_walled").is_some() {
+            assembly.decided.insert(assembly.materials.len());
+        }
         let base_color_texture = self.texture(&table, "base_color_texture", Encoding::Color, assembly)?;
         let surface = match kind {
             Kind::Dielectric => self.dielectric(&table, base_color_texture, assembly)?,

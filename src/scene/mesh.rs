@@ -40,6 +40,8 @@ pub struct Mesh {
     pub mending: Mending,
     /// Whether it may hold bodies that overlap.
     pub overlaps: bool,
+    /// The area of its holes over its own.
+    pub holes: f64,
 }
 
 /// A mesh as a file holds it, nothing of it checked.
@@ -194,7 +196,8 @@ impl Mesh {
         if let Some(first) = triangles.iter().position(bad) {
             return Err(Refusal::BadIndices { count: triangles.iter().filter(|t| bad(t)).count(), first, vertices });
         }
-        let Topology { inverted: turned, overlaps, sites } = topology::analyse(&positions, &triangles, &mut faults);
+        let Topology { inverted: turned, overlaps, sites, holes } =
+            topology::analyse(&positions, &triangles, &mut faults);
         let mut inverted = vec![false; if turned.is_empty() { 0 } else { vertices }];
         for number in turned {
             let triangle = &mut triangles[number as usize];
@@ -211,8 +214,18 @@ impl Mesh {
         let mut used = vec![false; vertices];
         triangles.iter().flatten().for_each(|&vertex| used[vertex as usize] = true);
         faults.unused_vertices = used.iter().filter(|used| !**used).count();
-        let mut mesh =
-            Self { name, positions, normals, uvs, triangles, faults, sites, mending: Mending::default(), overlaps };
+        let mut mesh = Self {
+            name,
+            positions,
+            normals,
+            uvs,
+            triangles,
+            faults,
+            sites,
+            mending: Mending::default(),
+            overlaps,
+            holes,
+        };
         if mesh.normals.len() != vertices {
             mesh.normals.clear();
         }

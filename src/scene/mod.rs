@@ -174,9 +174,10 @@ impl Scene {
         let framed = camera.is_none();
         let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
         let mut files = assembly.files();
-        let Assembly { meshes, objects, mut materials, textures, mut warnings, .. } = assembly;
+        let Assembly { meshes, mut objects, mut materials, textures, decided, mut warnings, .. } = assembly;
         let textures = textures.all;
-        warnings.splice(0..0, faults_of_meshes(&objects, &meshes, &materials));
+        let opened = panes_of_open_bodies(&mut objects, &meshes, &mut materials, &decided);
+        warnings.splice(0..0, faults_of_meshes(&objects, &meshes, &materials, &opened));
         warn_of_missing_uvs(&objects, &meshes, &materials, &textures, &mut warnings);
         for material in &mut materials {
             if let Surface::Dielectric(dielectric) = &mut material.surface {
@@ -242,22 +243,70 @@ impl Scene {
     }
 }
 
+/// Bodies whose holes are a larger share of their area than this are none: a jug without a lid is a sheet, one with a crack is a jug.
+const OPEN: f64 = 0.05;
+
+/// Makes panes of bodies that are none, unless a scene file `decided` on it; out flow their meshes. A material that closed bodies wear
+/// too is there twice then.
+fn panes_of_open_bodies(
+    objects: &mut [Object],
+    meshes: &[Arc<Mesh>],
+    materials: &mut Vec<Material>,
+    decided: &HashSet<usize>,
+) -> HashSet<usize> {
+    let is_open = |object: &Object| meshes[object.mesh].holes > OPEN;
+    let mut opened = HashSet::new();
+    for number in 0..materials.len() {
+        if materials[number].surface.body().is_none() || decided.contains(&number) {
+            continue;
+        }
+        let wearing = || objects.iter().filter(|object| object.material == number);
+        if !wearing().any(is_open) {
+            continue;
+        }
+        opened.extend(wearing().filter(|object| is_open(object)).map(|object| object.mesh));
+        let mut pane = number;
+        if !wearing().all(is_open) {
+            pane = materials.len();
+            let own = materials[number].clone();
+            materials.push(Material { name: format!("{}, thin-walled", own.name), ..own });
+        }
+        if let Surface::Dielectric(glass) = &mut materials[pane].surface {
+            glass.thin_walled = true;
+        }
+        let worn = objects.iter_mut().filter(|object| object.material == number);
+        worn.filter(|object| meshes[object.mesh].holes > OPEN).for_each(|object| object.material = pane);
+    }
+    opened
+}
+
 /// What is wrong with meshes, as far as it shows on what they are: only a medium wants a closed surface.
-fn faults_of_meshes(objects: &[Object], meshes: &[Arc<Mesh>], materials: &[Material]) -> Vec<String> {
+fn faults_of_meshes(
+    objects: &[Object],
+    meshes: &[Arc<Mesh>],
+    materials: &[Material],
+    opened: &HashSet<usize>,
+) -> Vec<String> {
     let mut bounds_medium = vec![false; meshes.len()];
     for object in objects {
         bounds_medium[object.mesh] |= materials[object.material].surface.body().is_some();
     }
     let mut warnings = Vec::new();
-    for (mesh, bounds_medium) in meshes.iter().zip(bounds_medium) {
-        let open_edges = if bounds_medium { mesh.faults.open_edges } else { 0 };
+    for (number, (mesh, bounds_medium)) in meshes.iter().zip(bounds_medium).enumerate() {
+        let is_pane = opened.contains(&number);
+        let open_edges = if bounds_medium || is_pane { mesh.faults.open_edges } else { 0 };
         let faults = MeshFaults { open_edges, ..mesh.faults };
         if faults.is_empty() {
             continue;
         }
-        let advice = match bounds_medium && !faults.is_closed() {
-            true => "; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true",
-            false => "",
+        let advice = if is_pane {
+            let holes = (mesh.holes * 100.0).round();
+            format!("; its holes are {holes} % of its area: it bounds no medium and is rendered thin-walled")
+        } else if bounds_medium && !faults.is_closed() {
+            "; the surface is not closed and bounds no medium well: --repair may close it, or it wants thin_walled = true"
+                .into()
+        } else {
+            String::new()
         };
         warnings.push(format!("{}: {faults}{advice}", mesh.name));
     }

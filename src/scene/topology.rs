@@ -3,11 +3,13 @@
 //!
 //! Vertices are welded by exact position first: files split vertices where normals or texture coordinates differ.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::Bounds;
 use super::containment::winding_number;
-use super::mesh::{FaultSites, MeshFaults};
+use super::mesh::{FaultSites, MeshFaults, area_vector};
 
 /// How many triangles may be visited to find out which shell holds which; beyond that bounding boxes decide.
 const WINDING_BUDGET: usize = 10_000_000;
@@ -37,25 +39,29 @@ pub struct Topology {
     pub overlaps: bool,
     /// Where the faults are.
     pub sites: FaultSites,
+    /// The area of its holes, over its own.
+    pub holes: f64,
 }
 
 /// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`.
 pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut MeshFaults) -> Topology {
     let mut sites = FaultSites::default();
-    let shells = pieces(positions, triangles, faults, &mut sites);
+    let mut open = Vec::new();
+    let shells = pieces(positions, triangles, faults, &mut sites, &mut open);
     let inverted = inverted_shells(&shells, positions);
     faults.inverted_shells = inverted.len();
     sites.inverted_shell = inverted.first().map(|shell| place(positions, shell.triangles[0][0]));
     Topology {
         overlaps: overlaps(&shells, &inverted),
         sites,
+        holes: holes(positions, triangles, &open),
         inverted: inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect(),
     }
 }
 
 /// The pieces of a surface.
 pub fn shells_of(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> Vec<Shell> {
-    pieces(positions, triangles, &mut MeshFaults::default(), &mut FaultSites::default())
+    pieces(positions, triangles, &mut MeshFaults::default(), &mut FaultSites::default(), &mut Vec::new())
 }
 
 fn pieces(
@@ -63,6 +69,7 @@ fn pieces(
     triangles: &[[u32; 3]],
     faults: &mut MeshFaults,
     sites: &mut FaultSites,
+    open: &mut Vec<[u32; 2]>,
 ) -> Vec<Shell> {
     let welded = weld(positions);
     // A triangle that welding folds up has edges that cancel out.
@@ -71,7 +78,7 @@ fn pieces(
         .map(|(number, triangle)| (number, triangle.map(|vertex| welded[vertex as usize])))
         .filter(|(_, [a, b, c])| a != b && b != c && c != a)
         .unzip();
-    let faulty = faulty_edges(positions, &triangles, faults, sites);
+    let faulty = faulty_edges(positions, &triangles, faults, sites, open);
     shells(positions, &numbers, triangles, &faulty)
 }
 
@@ -100,12 +107,45 @@ pub fn weld(positions: &[[f32; 3]]) -> Vec<u32> {
     welded
 }
 
-/// Counts the edges that do not join two triangles of one orientation and returns a vertex of each unbalanced one.
+/// The area of the holes of a surface, over its own: what plane sheets over them would have, or as much as is left of those that
+/// bend. `open` are the edges of one triangle only, along it.
+fn holes(positions: &[[f32; 3]], triangles: &[[u32; 3]], open: &[[u32; 2]]) -> f64 {
+    if open.is_empty() {
+        return 0.0;
+    }
+    // Edges that hang together go around one hole, or around several that touch.
+    let mut parent: HashMap<u32, u32> = open.iter().flatten().map(|&vertex| (vertex, vertex)).collect();
+    fn root(parent: &mut HashMap<u32, u32>, mut vertex: u32) -> u32 {
+        while let Some(&above) = parent.get(&vertex).filter(|&&above| above != vertex) {
+            let next = parent.get(&above).copied().unwrap_or(above);
+            parent.insert(vertex, next);
+            vertex = next;
+        }
+        vertex
+    }
+    for &[from, to] in open {
+        let (one, other) = (root(&mut parent, from), root(&mut parent, to));
+        parent.insert(one.max(other), one.min(other));
+    }
+    let mut rims: HashMap<u32, DVec3> = HashMap::new();
+    for &[from, to] in open {
+        let rim = root(&mut parent, from);
+        let origin = place(positions, rim);
+        let part = (place(positions, from) - origin).cross(place(positions, to) - origin);
+        *rims.entry(rim).or_insert(DVec3::ZERO) += part;
+    }
+    let whole: f64 = triangles.iter().map(|&triangle| area_vector(positions, triangle).length()).sum();
+    rims.values().map(|rim| rim.length()).sum::<f64>() / whole.max(f64::MIN_POSITIVE)
+}
+
+/// Counts the edges that do not join two triangles of one orientation and returns a vertex of each unbalanced one; puts those of one
+/// triangle only behind `open`.
 fn faulty_edges(
     positions: &[[f32; 3]],
     triangles: &[[u32; 3]],
     faults: &mut MeshFaults,
     sites: &mut FaultSites,
+    open: &mut Vec<[u32; 2]>,
 ) -> Vec<u32> {
     // One word an edge: the lower vertex, the higher one (no file that is read has 2^31), the direction.
     let mut edges = Vec::with_capacity(triangles.len() * 3);
@@ -124,6 +164,7 @@ fn faulty_edges(
         let middle = || (place(positions, low) + place(positions, high)) * 0.5;
         if same.len() == 1 {
             faults.open_edges += 1;
+            open.push(if backward == 0 { [low, high] } else { [high, low] });
             sites.open_edge.get_or_insert_with(middle);
         } else if !balanced {
             faults.inconsistent_edges += 1;

@@ -15,7 +15,7 @@ fn what_is_wrong_with_a_mesh_is_told_with_counts() {
         folder.load("mesh.obj")
     };
     let open = load(TETRAHEDRON.replace("f 2 3 4\n", "f 2 2 3\n")).unwrap();
-    let expected = "mesh.obj: 3 open edges, 1 degenerate triangle removed; the surface is not closed and bounds no medium well: as glass it wants thin_walled = true";
+    let expected = "mesh.obj: 3 open edges, 1 degenerate triangle removed; its holes are 58 % of its area: it bounds no medium and is rendered thin-walled";
     assert_eq!(open.warnings[0], expected);
     let inverted = load(
         TETRAHEDRON
@@ -175,7 +175,7 @@ fn polygons_groups_and_materials_become_triangles_and_parts() {
     let clear = dielectric(&scene, 3);
     assert!((clear.ior - 1.3).abs() < 1e-6 && (clear.roughness - 0.2).abs() < 1e-6);
     assert_eq!((clear.attenuation_color, clear.attenuation_distance), (DVec3::new(0.5, 1.0, 1.0), 1.0));
-    assert_eq!(dielectric(&scene, 4), &Dielectric::default());
+    assert_eq!(dielectric(&scene, 4), &Dielectric { thin_walled: true, ..Dielectric::default() }, "it is a sheet");
     assert_eq!(scene.objects[0].material, scene.objects[4].material, "one clear glass is enough");
     assert!(
         scene.warnings.iter().any(|w| w.ends_with("material \"none\" is in no MTL file that was read")),
@@ -299,4 +299,39 @@ fn a_latin_1_comment_is_no_reason_to_refuse_a_mesh() {
     let folder = Folder::new();
     folder.write("body.obj", [b"# caf\xe9\n", TETRAHEDRON.as_bytes()].concat());
     assert_eq!(folder.load("body.obj").unwrap().meshes[0].triangles.len(), 4);
+}
+
+/// A sheet is a pane, whatever it is drawn as, unless the scene file says otherwise; a crack makes no sheet of a body.
+#[test]
+fn open_bodies_are_panes() {
+    let folder = Folder::new();
+    folder.write("sheet.obj", "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n");
+    let pane = |scene: &Scene, index| dielectric(scene, index).thin_walled;
+    let scene = folder.load("sheet.obj").unwrap();
+    assert!(pane(&scene, 0));
+    let expected =
+        "sheet.obj: 4 open edges; its holes are 100 % of its area: it bounds no medium and is rendered thin-walled";
+    assert!(scene.warnings.contains(&expected.into()), "{:?}", scene.warnings);
+    // A box without two sides that meet: over both a sheet would bend.
+    folder.write(
+        "box.obj",
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 1\nv 1 0 1\nv 1 1 1\nv 0 1 1\n\
+        f 1 4 3 2\nf 1 2 6 5\nf 2 3 7 6\nf 3 4 8 7\n",
+    );
+    let scene = folder.load("box.obj").unwrap();
+    assert!(pane(&scene, 0) && scene.warnings[0].contains("its holes are 35 % of its area"), "{:?}", scene.warnings);
+
+    // One material, worn by a closed body and by a sheet.
+    let both = |material: &str| {
+        let objects =
+            "[[object]]\nmesh = \"body.obj\"\nmaterial = \"m\"\n[[object]]\nmesh = \"sheet.obj\"\nmaterial = \"m\"\n";
+        folder.scene(&format!("[material.m]\nkind = \"dielectric\"\nior = 1.4\n{material}{objects}")).unwrap()
+    };
+    let scene = both("");
+    assert_eq!([pane(&scene, 0), pane(&scene, 1)], [false, true]);
+    assert_eq!((dielectric(&scene, 1).ior, scene.materials.len()), (1.4, 2));
+    assert_eq!(scene.materials[1].name, "m, thin-walled");
+    let scene = both("thin_walled = false\n");
+    assert_eq!([pane(&scene, 0), pane(&scene, 1), scene.materials.len() == 1], [false, false, true]);
+    assert!(scene.warnings[0].contains("it wants thin_walled = true"), "{:?}", scene.warnings);
 }
