@@ -236,6 +236,7 @@ ranges! {
     inputs: u64, |x| (1..=1 << 40).contains(&x), "1 to 1099511627776 inputs";
     seed: u64, |_| true, "a whole number from 0 to 18446744073709551615";
     ior: f64, |x| (1e-6..=1e6).contains(&x), "an index above 0, from 1e-6 to 1e6";
+    angle: f64, |x| (0.0..=180.0).contains(&x), "an angle from 0 to 180 degrees";
     exposure: f64, |x| (-64.0..=64.0).contains(&x), "an exposure from -64 to 64 EV";
 }
 
@@ -299,6 +300,10 @@ pub struct RenderArgs {
     /// Repairs meshes: welds vertices along cracks, drops duplicate faces, turns triangles to agree with their neighbours, and says so
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
     pub repair: Option<bool>,
+
+    /// Interpolates normals of meshes that have none, across edges of up to so many degrees, 0 to 180
+    #[arg(long, value_name = "DEGREES", value_parser = range::angle)]
+    pub smooth_angle: Option<f64>,
 
     /// Leaves the options aside that the scene's table 'render' has
     #[arg(long, num_args = 0..=1, require_equals = true, default_missing_value = "true", value_name = "BOOL")]
@@ -389,6 +394,7 @@ impl RenderArgs {
             env: self.env.or(fallback.env),
             set: self.set.or(fallback.set),
             repair: self.repair.or(fallback.repair),
+            smooth_angle: self.smooth_angle.or(fallback.smooth_angle),
             no_render_table: self.no_render_table.or(fallback.no_render_table),
             exposure: self.exposure.or(fallback.exposure),
             tonemap: self.tonemap.or(fallback.tonemap),
@@ -430,6 +436,7 @@ impl RenderArgs {
             ("roughness", text(self.roughness.as_ref().map(|x| x as _))),
             ("env", self.env.as_ref().map(|path| path.display().to_string())),
             ("repair", text(self.repair.as_ref().map(|x| x as _))),
+            ("smooth-angle", text(self.smooth_angle.as_ref().map(|x| x as _))),
             ("exposure", text(self.exposure.as_ref().map(|x| x as _))),
             ("tonemap", self.tonemap.map(|curve| curve.name().to_owned())),
             ("aov", self.aov.as_ref().map(|aovs| aovs.iter().map(|aov| aov.name()).collect::<Vec<_>>().join(","))),

@@ -151,7 +151,7 @@ impl CostCommand {
     fn command(&self) -> String {
         let text = |value: Option<&dyn std::fmt::Display>| value.map(|value| value.to_string());
         let path = |path: &PathBuf| path.display().to_string();
-        let Changes { ior, roughness, env, set, repair } = &self.changes;
+        let Changes { ior, roughness, env, set, repair, smooth_angle } = &self.changes;
         let options = [
             ("size", text(self.size.as_ref().map(|x| x as _))),
             ("reference-time", text(self.reference_time.as_ref().map(|x| x as _))),
@@ -161,6 +161,7 @@ impl CostCommand {
             ("ior", text(ior.as_ref().map(|x| x as _))),
             ("roughness", text(roughness.as_ref().map(|x| x as _))),
             ("env", env.as_ref().map(path)),
+            ("smooth-angle", text(smooth_angle.as_ref().map(|x| x as _))),
             ("device", self.device.clone()),
             ("trace", self.trace.map(|trace| trace.name().to_owned())),
             ("output", self.output.as_ref().map(path)),

@@ -79,6 +79,10 @@ struct Changes {
     /// Repairs meshes: welds vertices along cracks, drops duplicate faces, turns triangles to agree with their neighbours, and says so
     #[arg(long)]
     repair: bool,
+
+    /// Interpolates normals of meshes that have none, across edges of up to so many degrees, 0 to 180
+    #[arg(long, value_name = "DEGREES", value_parser = range::angle)]
+    smooth_angle: Option<f64>,
 }
 
 impl Changes {
@@ -89,6 +93,7 @@ impl Changes {
             environment: self.env.clone(),
             settings: self.set.clone(),
             repair: self.repair.then_some(true),
+            smooth_angle: self.smooth_angle,
             no_render_table: false,
         }
     }

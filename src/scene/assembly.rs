@@ -10,7 +10,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use glam::{DAffine3, DVec3};
 
 use super::files::Files;
-use super::mesh::FARTHEST;
+use super::mesh::{FARTHEST, Preparation};
 use super::mesh_file::{Image, MeshFile};
 use super::texture::Textures;
 use super::{Bounds, Material, Mesh, Object, Opaque, Surface};
@@ -26,8 +26,7 @@ pub struct Assembly {
     pub warnings: Vec<String>,
     /// Materials that a scene file says of whether they are panes.
     pub decided: HashSet<usize>,
-    /// Meshes are mended beyond what [`Mesh::new`] does.
-    repair: bool,
+    preparation: Preparation,
     read: HashMap<PathBuf, Loaded>,
     clear_glass: Option<usize>,
 }
@@ -74,9 +73,9 @@ pub enum Wear {
 }
 
 impl Assembly {
-    /// Nothing yet; meshes to come are mended where `repair` says so.
-    pub fn new(repair: Option<bool>) -> Self {
-        Self { repair: repair == Some(true), ..Self::default() }
+    /// Nothing yet; meshes to come are prepared like that.
+    pub fn new(preparation: Preparation) -> Self {
+        Self { preparation, ..Self::default() }
     }
 
     /// Reads mesh files ahead, several at once. The first that cannot be read is the error.
@@ -88,12 +87,12 @@ impl Assembly {
                 distinct.push((identity, path));
             }
         }
-        let repair = self.repair;
+        let preparation = self.preparation;
         let next = AtomicUsize::new(0);
         let work = || {
             let next = || distinct.get(next.fetch_add(1, Ordering::Relaxed));
             std::iter::from_fn(next)
-                .map(|(identity, path)| (identity, MeshFile::read(files, path, repair)))
+                .map(|(identity, path)| (identity, MeshFile::read(files, path, preparation)))
                 .collect::<Vec<_>>()
         };
         let workers = std::thread::available_parallelism().map_or(1, usize::from).min(distinct.len());
@@ -116,7 +115,7 @@ impl Assembly {
         let loaded = match self.read.entry(files.identity(path)) {
             Entry::Occupied(known) => known.into_mut(),
             Entry::Vacant(place) => {
-                let file = MeshFile::read(files, path, self.repair)?;
+                let file = MeshFile::read(files, path, self.preparation)?;
                 place.insert(Loaded::new(file, &mut self.meshes, &mut self.warnings))
             }
         };

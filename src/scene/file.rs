@@ -72,8 +72,8 @@ pub fn read(files: Files, path: &Path, overrides: &Overrides) -> Result<SceneFil
     let camera = root.get("camera").map(camera).transpose()?;
     let render = root.or("render", RenderArgs::default(), |entry| options(entry, "render", files, reader.folder))?;
     let lights = root.or("light", Vec::new(), |entry| entry.tables()?.into_iter().map(light).collect())?;
-    let own = render.repair.filter(|_| !overrides.no_render_table);
-    let mut assembly = Assembly::new(overrides.repair.or(own));
+    let own = if overrides.no_render_table { Overrides::default() } else { Overrides::of(&render) };
+    let mut assembly = Assembly::new(overrides.preparation(&own));
     if let Some(materials) = root.get("material") {
         for entry in materials.any_table("material.NAME")?.entries() {
             let material = reader.material(entry, &mut assembly)?;

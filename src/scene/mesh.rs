@@ -11,6 +11,7 @@ use serde::Serialize;
 
 use super::Bounds;
 use super::doctor::{Mending, mend};
+use super::smoothing::smooth;
 use super::topology::{self, Topology};
 
 /// The farthest a vertex, light or camera may lie from the origin. The renderer's 32-bit arithmetic squares areas:
@@ -57,6 +58,15 @@ pub struct RawMesh {
     pub uvs: Vec<[f32; 2]>,
     /// Indices of vertices, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
+}
+
+/// What is done to a mesh beyond what [`Mesh::new`] does.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Preparation {
+    /// It is mended.
+    pub repair: bool,
+    /// Normals that it lacks are made across edges of at most so many radians; 0: it stays without.
+    pub smooth_angle: f64,
 }
 
 /// What was wrong with a mesh, as counts.
@@ -238,9 +248,10 @@ impl Mesh {
         Ok(mesh)
     }
 
-    /// The same of what is mended first, if `repair` says so.
-    pub fn mended(mut raw: RawMesh, repair: bool) -> Result<Self, Refusal> {
-        let mending = if repair { mend(&mut raw) } else { Mending::default() };
+    /// The same of what is prepared first.
+    pub fn prepared(mut raw: RawMesh, preparation: Preparation) -> Result<Self, Refusal> {
+        let mending = if preparation.repair { mend(&mut raw) } else { Mending::default() };
+        smooth(&mut raw, preparation.smooth_angle);
         Ok(Self { mending, ..Self::new(raw)? })
     }
 

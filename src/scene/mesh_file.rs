@@ -6,6 +6,7 @@ use std::sync::Arc;
 use glam::DAffine3;
 
 use super::files::Files;
+use super::mesh::Preparation;
 use super::texture::Encoding;
 use super::{Camera, Material, Mesh, PointLight, gltf, obj};
 use crate::Result;
@@ -74,12 +75,11 @@ pub enum ImageSource {
 }
 
 impl MeshFile {
-    /// Reads the mesh file at `path`, of a kind that [`check_kind`] lets pass; `repair`s the meshes beyond what
-    /// [`Mesh::new`] does.
-    pub fn read(files: Files, path: &Path, repair: bool) -> Result<Self> {
+    /// Reads the mesh file at `path`, of a kind that [`check_kind`] lets pass; meshes are prepared first.
+    pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<Self> {
         match is_gltf(path) {
-            true => gltf::read(files, path, repair),
-            false => obj::read(files, path, repair),
+            true => gltf::read(files, path, preparation),
+            false => obj::read(files, path, preparation),
         }
     }
 }

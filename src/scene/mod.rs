@@ -23,6 +23,7 @@ mod obj;
 mod obj_text;
 pub(crate) mod render_table;
 mod settings;
+mod smoothing;
 pub(crate) mod table;
 mod texture;
 mod topology;
@@ -42,7 +43,7 @@ pub use environment::{Environment, Panorama, Repairs, Surroundings};
 pub(crate) use files::Files;
 pub use maps::{Cutout, NormalMap, TextureMap, Wrap};
 pub use material::{Coating, Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
-pub use mesh::{FaultSites, Mesh, MeshFaults, RawMesh, Refusal};
+pub use mesh::{FaultSites, Mesh, MeshFaults, Preparation, RawMesh, Refusal};
 pub use texture::{Encoding, Texels, Texture};
 pub use touching::Touch;
 
@@ -119,6 +120,8 @@ pub struct Overrides {
     pub settings: Vec<String>,
     /// Meshes are repaired, or not, whatever the scene's own render options say: docs/doctor.md.
     pub repair: Option<bool>,
+    /// Normals that meshes lack are made across edges of at most so many degrees.
+    pub smooth_angle: Option<f64>,
     /// The scene's own render options count for nothing.
     pub no_render_table: bool,
 }
@@ -345,7 +348,7 @@ fn warn_of_missing_uvs(
 /// A mesh file in the default environment: glTF as the scene that it is, anything else as clear glass.
 fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
     mesh_file::check_kind(path).map_err(|message| Error::input(path, 0, message))?;
-    let mut assembly = Assembly::new(overrides.repair);
+    let mut assembly = Assembly::new(overrides.preparation(&Overrides::default()));
     let (wear, number) = match mesh_file::is_gltf(path) {
         true => (Wear::Own, None),
         false => (Wear::ClearGlass, Some(0)),
@@ -368,7 +371,16 @@ impl Overrides {
             environment: args.env.clone(),
             settings: args.set.clone().unwrap_or_default(),
             repair: args.repair,
+            smooth_angle: args.smooth_angle,
             no_render_table: args.no_render_table == Some(true),
+        }
+    }
+
+    /// What is done to meshes, as these or else the scene's own say.
+    fn preparation(&self, own: &Self) -> Preparation {
+        Preparation {
+            repair: self.repair.or(own.repair).unwrap_or(false),
+            smooth_angle: self.smooth_angle.or(own.smooth_angle).unwrap_or(0.0).to_radians(),
         }
     }
 

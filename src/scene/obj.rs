@@ -10,14 +10,15 @@ use std::path::Path;
 use glam::DAffine3;
 
 use super::files::Files;
-use super::mesh::{Mesh, RawMesh, Refusal};
+use super::mesh::{Mesh, Preparation, RawMesh, Refusal};
 use super::mesh_file::{MeshFile, Part, shorten, worn};
 use super::mtl;
 use super::obj_text::{Tidy, bad_number};
+use super::smoothing::average;
 use crate::{Error, Result};
 
-/// Reads the `.obj` at `path` and the `.mtl` it names; `repair`s the meshes beyond what [`Mesh::new`] does.
-pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
+/// Reads the `.obj` at `path` and the `.mtl` it names; meshes are prepared first.
+pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<MeshFile> {
     let bytes = files.read(path)?;
     if bytes.contains(&0) {
         return Err(Error::input(path, 0, "is binary, not Wavefront OBJ text; export as .obj"));
@@ -47,7 +48,7 @@ pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     })?;
     let file = path.file_name().unwrap_or(path.as_os_str()).to_string_lossy();
     let mut warnings: Vec<_> = tidy.remarks.iter().map(|remark| format!("{file}: {remark}")).collect();
-    let (meshes, mut parts) = parts(path, &file, &text, models, repair, &mut warnings)?;
+    let (meshes, mut parts) = parts(path, &file, &text, models, tidy.grouped, preparation, &mut warnings)?;
     let materials = worn(&mut parts, materials);
     Ok(MeshFile { meshes, parts, materials, images, warnings, material_warnings, ..MeshFile::default() })
 }
@@ -58,7 +59,8 @@ fn parts(
     file: &str,
     text: &str,
     models: Vec<tobj::Model>,
-    repair: bool,
+    grouped: bool,
+    preparation: Preparation,
     warnings: &mut Vec<String>,
 ) -> Result<(Vec<Mesh>, Vec<Part>)> {
     let mut raw: Vec<(RawMesh, Option<usize>)> = Vec::new();
@@ -80,8 +82,12 @@ fn parts(
     let (mut meshes, mut parts) = (Vec::new(), Vec::new());
     let mut lost = 0;
     for (mut part, material) in raw {
+        if grouped {
+            // Vertices are those of their groups: the faces around each are smooth.
+            average(&mut part);
+        }
         part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
-        match Mesh::mended(part, repair) {
+        match Mesh::prepared(part, preparation) {
             Ok(mesh) => {
                 parts.push(Part { mesh: meshes.len(), material, transform: DAffine3::IDENTITY, object: 0 });
                 meshes.push(mesh);

@@ -7,7 +7,7 @@
 //! replaces both.
 
 use std::borrow::Cow;
-use std::collections::HashSet;
+use std::collections::{HashMap, HashSet};
 use std::fmt::Write;
 
 use super::mesh::FARTHEST;
@@ -23,6 +23,41 @@ pub struct Tidy {
     pub materials: Vec<String>,
     /// What was left out, one line each.
     pub remarks: Vec<String>,
+    /// Whether there are smoothing groups and no normals: each corner has one of zero then, one for each group and one for each face
+    /// that is in none.
+    pub grouped: bool,
+    /// How many groups there are.
+    groups: usize,
+}
+
+/// Smoothing groups, as lines that begin with `s` open them.
+#[derive(Default)]
+struct Groups {
+    /// In the order of their first faces.
+    numbers: HashMap<String, usize>,
+    current: Option<String>,
+    /// Faces in none so far.
+    flat: usize,
+}
+
+impl Groups {
+    fn open(&mut self, name: &str) {
+        self.current = Some(name).filter(|name| !["", "0", "off"].contains(name)).map(str::to_owned);
+    }
+
+    /// The number of the next face's group, or that it is in none and how many were before it.
+    fn face(&mut self) -> Result<usize, usize> {
+        match &self.current {
+            Some(name) => {
+                let next = self.numbers.len();
+                Ok(*self.numbers.entry(name.clone()).or_insert(next))
+            }
+            None => {
+                self.flat += 1;
+                Err(self.flat - 1)
+            }
+        }
+    }
 }
 
 /// A line, from 1, and what is wrong with it.
@@ -51,8 +86,8 @@ const KINDS: [Kind; 3] = [
 ];
 
 /// Keywords that say nothing about triangles.
-const SILENT: [&str; 12] =
-    ["vp", "g", "s", "mg", "lod", "bevel", "c_interp", "d_interp", "usemap", "maplib", "shadow_obj", "trace_obj"];
+const SILENT: [&str; 11] =
+    ["vp", "g", "mg", "lod", "bevel", "c_interp", "d_interp", "usemap", "maplib", "shadow_obj", "trace_obj"];
 
 /// Keywords of geometry that is no polygon.
 const FREE_FORM: [&str; 14] =
@@ -72,8 +107,14 @@ impl Tidy {
     fn vertices(&mut self, text: &str) -> Result<Counts, Fault> {
         let mut counts = [0; 3];
         let mut blocks = [std::mem::take(&mut self.text), String::new(), String::new()];
+        let mut groups = Groups::default();
         for (number, line) in lines(text) {
             let (keyword, rest) = split_keyword(&line);
+            match keyword {
+                "s" => groups.open(rest),
+                "f" | "fo" => drop(groups.face()),
+                _ => {}
+            }
             let Some((index, kind)) = kind_of(keyword) else { continue };
             counts[index] += 1;
             let out = &mut blocks[index];
@@ -93,6 +134,14 @@ impl Tidy {
         for rest in [&coordinates, "vt nan nan\n", &normals, "vn 0 0 0\n"] {
             self.text.push_str(rest);
         }
+        self.grouped = counts[2] == 0 && !groups.numbers.is_empty();
+        if self.grouped {
+            // One is there already.
+            for _ in 1..groups.numbers.len() + groups.flat {
+                self.text.push_str("vn 0 0 0\n");
+            }
+            self.groups = groups.numbers.len();
+        }
         Ok(counts)
     }
 
@@ -103,10 +152,13 @@ impl Tidy {
         let (mut slivers, mut wires, mut free_form, mut unknown) = (0, 0, 0, Vec::new());
         let (mut libraries, mut materials) = (HashSet::new(), HashSet::new());
         let mut out_of_range: Vec<Fault> = Vec::new();
+        let mut groups = Groups::default();
         for (number, line) in lines(text) {
             let (keyword, rest) = split_keyword(&line);
             match keyword {
+                "s" => groups.open(rest),
                 "f" | "fo" => {
+                    let group = groups.face().unwrap_or_else(|flat| self.groups + flat);
                     let corners: Result<Vec<_>, _> =
                         rest.split_ascii_whitespace().map(|corner| Corner::read(corner, counts, totals)).collect();
                     match corners {
@@ -117,7 +169,7 @@ impl Tidy {
                         Ok(corners) if corners.len() < 3 => slivers += 1,
                         Ok(corners) => {
                             corners.iter().for_each(|corner| used[corner.vertex] = true);
-                            self.face(&corners, totals);
+                            self.face(&corners, totals, group);
                         }
                     }
                 }
@@ -176,20 +228,22 @@ impl Tidy {
     }
 
     /// A face whose corners without texture coordinates or a normal get those at the end of all.
-    fn face(&mut self, corners: &[Corner<'_>], [_, coordinates, normals]: Counts) {
+    fn face(&mut self, corners: &[Corner<'_>], [_, coordinates, normals]: Counts, group: usize) {
         self.text.push('f');
+        let has_normals = normals > 0 || self.grouped;
+        let other = if self.grouped { group } else { normals };
         for corner in corners {
             self.text.push(' ');
             push_index(&mut self.text, corner.vertex_text, corner.vertex);
-            if coordinates + normals > 0 {
+            if coordinates > 0 || has_normals {
                 self.text.push('/');
             }
             if coordinates > 0 {
                 push_index(&mut self.text, corner.coordinate_text, corner.coordinate.unwrap_or(coordinates));
             }
-            if normals > 0 {
+            if has_normals {
                 self.text.push('/');
-                push_index(&mut self.text, corner.normal_text, corner.normal.unwrap_or(normals));
+                push_index(&mut self.text, corner.normal_text, corner.normal.unwrap_or(other));
             }
         }
         self.text.push('\n');

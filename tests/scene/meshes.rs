@@ -176,7 +176,7 @@ fn polygons_groups_and_materials_become_triangles_and_parts() {
     assert!((clear.ior - 1.3).abs() < 1e-6 && (clear.roughness - 0.2).abs() < 1e-6);
     assert_eq!((clear.attenuation_color, clear.attenuation_distance), (DVec3::new(0.5, 1.0, 1.0), 1.0));
     assert_eq!(dielectric(&scene, 4), &Dielectric { thin_walled: true, ..Dielectric::default() }, "it is a sheet");
-    assert_eq!(scene.objects[0].material, scene.objects[4].material, "one clear glass is enough");
+    assert_eq!(scene.materials[scene.objects[0].material].name, "clear glass");
     assert!(
         scene.warnings.iter().any(|w| w.ends_with("material \"none\" is in no MTL file that was read")),
         "{:?}",
@@ -334,4 +334,61 @@ fn open_bodies_are_panes() {
     let scene = both("thin_walled = false\n");
     assert_eq!([pane(&scene, 0), pane(&scene, 1), scene.materials.len() == 1], [false, false, true]);
     assert!(scene.warnings[0].contains("it wants thin_walled = true"), "{:?}", scene.warnings);
+}
+
+/// A roof of two slopes that meet at a right angle.
+const ROOF: &str = "v -1 0 0\nv 0 1 0\nv 0 1 1\nv -1 0 1\nv 1 0 0\nv 1 0 1\n";
+
+#[test]
+fn smoothing_groups_make_normals() {
+    let folder = Folder::new();
+    let mesh = |faces: &str| {
+        folder.write("roof.obj", format!("{ROOF}{faces}"));
+        let scene = folder.load("roof.obj").unwrap();
+        (scene.meshes[0].clone(), scene.warnings.clone())
+    };
+    let ridge = |faces: &str| {
+        let (mesh, _) = mesh(faces);
+        let all = mesh.positions.iter().zip(&mesh.normals).filter(|(position, _)| position[0] == 0.0);
+        let mut normals: Vec<_> = all.map(|(_, normal)| normal.map(|x| (x * 1000.0).round() as i32)).collect();
+        normals.sort_unstable();
+        normals.dedup();
+        normals
+    };
+    let slopes = ["f 4 3 2 1", "f 3 6 5 2"];
+    let [one, other] = slopes;
+    assert!(mesh(&format!("{one}\n{other}\n")).0.normals.is_empty(), "without groups it is flat");
+    assert!(mesh(&format!("s off\n{one}\n{other}\n")).0.normals.is_empty());
+    assert_eq!(ridge(&format!("s 1\n{one}\n{other}\n")), [[0, 1000, 0]]);
+    let sharp = [[-707, 707, 0], [707, 707, 0]];
+    assert_eq!(ridge(&format!("s 1\n{one}\ns 2\n{other}\n")), sharp);
+    assert_eq!(ridge(&format!("s 1\n{one}\ns 0\n{other}\n")), sharp);
+    assert_eq!(ridge(&format!("{other}\ns 1\n{one}\n")), sharp);
+    // What has normals keeps them, and nothing is said of lines that are understood.
+    let (mesh, warnings) =
+        mesh(&format!("vn 0 0 1\ns 1\n{}\n", one.replace(' ', "//1 ").replacen("//1", "", 1) + "//1"));
+    assert!(mesh.normals.iter().all(|normal| *normal == [0.0, 0.0, 1.0]), "{:?}", mesh.normals);
+    assert!(!warnings.iter().any(|warning| warning.contains("not understood")), "{warnings:?}");
+}
+
+#[test]
+fn normals_are_made_up_to_an_angle_where_that_is_asked_for() {
+    let folder = Folder::new();
+    folder.write("roof.obj", format!("{ROOF}f 4 3 2 1\nf 3 6 5 2\n"));
+    folder.write("own.toml", "[render]\nsmooth_angle = 100\n[[object]]\nmesh = \"roof.obj\"\n");
+    let load = |name: &str, smooth_angle| {
+        let overrides = Overrides { smooth_angle, ..Overrides::default() };
+        Scene::load(Some(&folder.path(name)), &overrides).unwrap().meshes[0].normals.len()
+    };
+    // Six vertices, or eight of which the two of the ridge are there twice.
+    for (name, angle, expected) in [
+        ("roof.obj", None, 0),
+        ("roof.obj", Some(91.0), 6),
+        ("roof.obj", Some(89.0), 8),
+        ("own.toml", None, 6),
+        ("own.toml", Some(30.0), 8),
+        ("own.toml", Some(0.0), 0),
+    ] {
+        assert_eq!(load(name, angle), expected, "{name} {angle:?}");
+    }
 }

@@ -8,7 +8,7 @@ use gltf::{Accessor, Mesh as Source};
 
 use super::Remarks;
 use super::accessor::Accessors;
-use crate::scene::mesh::{Mesh, RawMesh, Refusal};
+use crate::scene::mesh::{Mesh, Preparation, RawMesh, Refusal};
 
 /// How many indices are read at most for each byte of the buffers.
 const MOST_SHARED: usize = 4;
@@ -31,8 +31,7 @@ pub struct Meshes<'a> {
     file: &'a str,
     several: bool,
     remarks: &'a mut Remarks,
-    /// They are mended beyond what [`Mesh::new`] does.
-    repair: bool,
+    preparation: Preparation,
     /// Out flows.
     pub all: Vec<Mesh>,
     /// Triangles without an area in parts that held nothing else.
@@ -51,7 +50,7 @@ impl<'a> Meshes<'a> {
         sets: &'a [u32],
         file: &'a str,
         several: bool,
-        repair: bool,
+        preparation: Preparation,
         remarks: &'a mut Remarks,
     ) -> Self {
         let indices_left = MOST_SHARED * accessors.bytes() + (1 << 20);
@@ -61,7 +60,7 @@ impl<'a> Meshes<'a> {
             file,
             several,
             remarks,
-            repair,
+            preparation,
             all: Vec::new(),
             lost: 0,
             known: HashMap::new(),
@@ -176,7 +175,7 @@ impl<'a> Meshes<'a> {
                 self.remarks.leave_out("vertex colours");
             }
         }
-        match Mesh::mended(raw, self.repair) {
+        match Mesh::prepared(raw, self.preparation) {
             Ok(mesh) => {
                 self.all.push(mesh);
                 Ok(Some(self.all.len() - 1))

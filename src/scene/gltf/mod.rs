@@ -21,7 +21,7 @@ use gltf::scene::Transform;
 use gltf::{Document, Node, json};
 
 use super::files::Files;
-use super::mesh::FARTHEST;
+use super::mesh::{FARTHEST, Preparation};
 use super::mesh_file::{MeshFile, Part, shorten, worn};
 use super::table::SCALE;
 use super::{Camera, Material, PointLight};
@@ -81,8 +81,8 @@ impl Remarks {
     }
 }
 
-/// Reads the `.gltf` or `.glb` at `path`; `repair`s the meshes beyond what [`super::Mesh::new`] does.
-pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
+/// Reads the `.gltf` or `.glb` at `path`; meshes are prepared first.
+pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<MeshFile> {
     let wrong = |message: String| Error::input(path, 0, message);
     let bytes = files.read(path)?;
     let Container { json, binary } = Container::new(&bytes).map_err(wrong)?;
@@ -110,7 +110,7 @@ pub fn read(files: Files, path: &Path, repair: bool) -> Result<MeshFile> {
     let mut remarks = Remarks::default();
     leave_out(&document, &mut remarks);
     let accessors = Accessors::new(&buffers);
-    let mut meshes = Meshes::new(&accessors, &sets, &file, document.meshes().len() > 1, repair, &mut remarks);
+    let mut meshes = Meshes::new(&accessors, &sets, &file, document.meshes().len() > 1, preparation, &mut remarks);
     let mut scene = SceneParts::default();
     for node in roots(&document) {
         scene.add(&node, &mut meshes).map_err(wrong)?;
