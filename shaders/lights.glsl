@@ -46,10 +46,8 @@ Lit LitAt(Record record)
     if (TEXTURES && material.colorMap != 0) color = vec3(unpackUnorm2x16(record.color.x), last.x);
     float metallic = material.metallic;
     float roughness = material.roughness;
-    if (TEXTURES && material.finishMap != 0) {
-        metallic = last.y;
-        roughness = uintBitsToFloat(record.roughness);
-    }
+    if (TEXTURES && material.finishMap != 0) roughness = uintBitsToFloat(record.roughness);
+    if ((TEXTURES && material.finishMap != 0) || (COATINGS && material.kind != KIND_OPAQUE)) metallic = last.y;
     lit.surface = OpaqueSurfaceOf(color, metallic, roughness, material.head, material.specular);
     return lit;
 }
@@ -134,7 +132,7 @@ bool AskFor(uint number, Record record, Lit lit, out LightRay ray)
 }
 
 // What a dielectric at `arrival` leaves of a light ray that goes straight through it.
-void PassThrough(inout LightRay light, Material material, Arrival arrival)
+void PassThrough(inout LightRay light, Material material, Arrival arrival, bool isThere)
 {
     bool disperses = false;
     Crossing crossing = CrossingOf(arrival.found, material, arrival.behind, light.at, D_LINE, disperses);
@@ -145,18 +143,9 @@ void PassThrough(inout LightRay light, Material material, Arrival arrival)
     float denser = max(crossing.etaI, crossing.etaT);
     Interface crossed = FresnelDielectric(max(dot(-light.direction, normal), LEAST_SLOPE), thinner, denser);
     bool isPane = crossing.isPane && !crossed.total;
-    light.throughput *= isPane ? PaneTransmittance(crossed.reflectance, crossed.transmittance) : crossed.transmittance;
+    if (isThere) light.throughput *= isPane ? PaneTransmittance(crossed.reflectance, crossed.transmittance) : crossed.transmittance;
     light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
     light.at = crossing.boundary.beyond;
-    light.origin = LeaveFrom(arrival, light.direction);
-    light.left = arrival.found;
-}
-
-// What a surface leaves of it that is not there everywhere.
-void PassBy(inout LightRay light, float presence, Arrival arrival)
-{
-    light.throughput *= (1.0 - presence) * Absorbed(light.at.medium, arrival.distance);
-    light.reach -= light.reach < LARGEST_FLOAT ? arrival.distance : 0.0;
     light.origin = LeaveFrom(arrival, light.direction);
     light.left = arrival.found;
 }
@@ -205,7 +194,8 @@ void main()
             if (onItsWay) {
                 Dressed dressed = DressAt(materials[instances[found.instance].material], found, arrival.weights, mat2(0.0));
                 Material material = dressed.material;
-                isBlocked = dressed.presence == 1.0 && (material.kind == KIND_OPAQUE || (COATINGS && dressed.through == 0.0));
+                bool isThere = !CUTOUTS || dressed.presence >= 0.5;
+                isBlocked = isThere && (material.kind == KIND_OPAQUE || (COATINGS && dressed.through == 0.0));
                 if (isBlocked) {
                     // What stands in the way of the environment sends its own light, and its colour of what the half of the environment
                     // before it sends, whatever else is there.
@@ -218,9 +208,8 @@ void main()
                     light.throughput *= Absorbed(light.at.medium, arrival.distance);
                     onItsWay = false;
                 } else {
-                    if (CUTOUTS && dressed.presence < 1.0) PassBy(light, dressed.presence, arrival);
-                    else PassThrough(light, material, arrival);
-                    if (COATINGS && dressed.presence == 1.0) light.throughput *= dressed.through * material.baseColor;
+                    PassThrough(light, material, arrival, isThere);
+                    if (COATINGS && isThere) light.throughput *= dressed.through * material.baseColor;
                     onItsWay = Largest(abs(light.throughput)) > LEAST_SHARE && ++passed <= MOST_PASSED;
                     isBlocked = !onItsWay;
                     share = vec3(0.0);

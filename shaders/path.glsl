@@ -226,7 +226,10 @@ void main()
         vec3 emitted = vec3(1.0);
         if (isLight && OPAQUE && ray.aim != NOWHERE) {
             bool arrives = meets && found == ray.aim;
-            emitted = arrives ? dressed.presence * material.emission : materials[instances[ray.aim.instance].material].emission;
+            Material lamp = materials[instances[ray.aim.instance].material];
+            // Where rounding has it miss what it aims at: as bright as that is in the mean.
+            vec3 mean = lamp.emission * lamp.shines / max(dot(lamp.emission, vec3(0.2126, 0.7152, 0.0722)), 1e-30);
+            emitted = arrives ? dressed.presence * material.emission : mean;
         }
         if (meets && isLight) {
             bool isPoint = ray.reach < LARGEST_FLOAT && ray.aim == NOWHERE;
@@ -237,17 +240,23 @@ void main()
             vec3 coins = vec3(Pcg3d(uvec3(sequence.seed, sequence.index, turn)) >> 8) / float(1 << 24);
             isThere = isLight ? dressed.presence == 1.0 : coins.x < dressed.presence;
             if (isLight && !isThere) ray.throughput *= 1.0 - dressed.presence;
-            if (coins.y >= dressed.through) material.kind = KIND_OPAQUE;
+            if (OPAQUE && coins.y >= dressed.through) material.kind = KIND_OPAQUE;
         }
         ++turn;
         Boundary boundary = Boundary(ray.at, ray.at);
         Crossing crossing = Crossing(boundary, 1.0, 1.0, false, false, false);
         bool disperses = false;
         if (meets) {
-            if (isThere) crossing = CrossingOf(found, material, arrival.behind, ray.at, wavelength.nanometres, disperses);
-            else crossing.passes = true;
+            crossing = CrossingOf(found, material, arrival.behind, ray.at, wavelength.nanometres, disperses);
             boundary = crossing.boundary;
             ray.throughput *= Absorbed(boundary.before.medium, arrival.distance);
+            if (!isThere) {
+                // The medium is another one beyond, but nothing shows that.
+                crossing.isOpaque = false;
+                crossing.passes = true;
+            } else if (COATINGS && crossing.passes) {
+                ray.throughput *= material.baseColor;
+            }
         }
         bool isOpaque = crossing.isOpaque;
         bool passes = crossing.passes;

@@ -155,12 +155,14 @@ Dressed DressAt(Material material, Found found, vec3 weights, mat2 sides)
         }
         if (joined) alpha = color.a;
         if (normalMap != 0) {
-            // Along the mesh's coordinates, as long as along those of the image.
-            vec2 slope = vec2(dressed.bump.x, -dressed.bump.y) * material.normalScale;
+            // Where in the mesh's coordinates the image's lead to the right, and downwards: the inverse of its turn, of unit length.
             mat2 turn = TurnOf(normalMap);
-            vec2 turned = vec2(turn[1].y * slope.x - turn[1].x * slope.y, turn[0].x * slope.y - turn[0].y * slope.x);
-            turned *= sign(turn[0].x * turn[1].y - turn[0].y * turn[1].x) * length(slope) / max(length(turned), 1e-30);
-            dressed.bump = vec3(turned.x, -turned.y, max(dressed.bump.z, 1e-3));
+            vec2 right = vec2(turn[1].y, -turn[0].y);
+            vec2 down = vec2(-turn[1].x, turn[0].x);
+            float side = sign(turn[0].x * turn[1].y - turn[0].y * turn[1].x);
+            vec2 slope = dressed.bump.x * right / max(length(right), 1e-30) - dressed.bump.y * down / max(length(down), 1e-30);
+            slope *= side * material.normalScale;
+            dressed.bump = vec3(slope.x, -slope.y, max(dressed.bump.z, 1e-3));
         }
     }
     if (TEXTURES) {
@@ -173,22 +175,22 @@ Dressed DressAt(Material material, Found found, vec3 weights, mat2 sides)
         alpha *= material.alpha;
         dressed.presence = material.alphaCutoff < 0.0 ? alpha : float(alpha >= material.alphaCutoff);
     }
-    if (COATINGS && material.kind != KIND_OPAQUE) {
-        dressed.through = material.transmission * transmission.r * (1.0 - dressed.material.metallic);
+    if (COATINGS && OPAQUE && material.kind != KIND_OPAQUE) {
+        float metallic = dressed.material.metallic;
+        dressed.through = material.transmission * transmission.r * (1.0 - metallic);
+        // Of what lets nothing through.
+        dressed.material.metallic = metallic / max(1.0 - dressed.through, 1e-6);
     }
     return dressed;
 }
 
-// A number a vertex behind the coordinates: its tangent in the mesh's space, as an octahedron has it (Cigolle et al. 2014), 4 added to
-// the first where the coordinates are mirrored.
-vec4 FetchTangent(uint vertex)
+// Two numbers a vertex behind the coordinates: its tangent in the mesh's space, as an octahedron has it (Cigolle et al. 2014).
+vec3 FetchTangent(uint vertex)
 {
     vec2 place = coordinates[frame.firstTangent + vertex];
-    float side = place.x > 2.0 ? -1.0 : 1.0;
-    if (place.x > 2.0) place.x -= 4.0;
     vec3 tangent = vec3(place, 1.0 - abs(place.x) - abs(place.y));
     if (tangent.z < 0.0) tangent.xy = (1.0 - abs(tangent.yx)) * vec2(tangent.x < 0.0 ? -1.0 : 1.0, tangent.y < 0.0 ? -1.0 : 1.0);
-    return vec4(normalize(tangent), side);
+    return normalize(tangent);
 }
 
 // The normal of a surface that has `normal` without its map.
@@ -196,16 +198,19 @@ vec3 BumpedNormal(vec3 bump, vec3 normal, Found found, vec3 weights)
 {
     if (bump.x == 0.0 && bump.y == 0.0) return normal;
     uvec3 vertices = VerticesOf(found);
-    vec4 first = FetchTangent(vertices.x);
-    vec3 mean = weights.x * first.xyz + weights.y * FetchTangent(vertices.y).xyz + weights.z * FetchTangent(vertices.z).xyz;
+    vec3 mean = weights.x * FetchTangent(vertices.x) + weights.y * FetchTangent(vertices.y) + weights.z * FetchTangent(vertices.z);
+    mat3x2 corners = CoordinatesOf(vertices);
+    vec2 right = corners[1] - corners[0];
+    vec2 up = corners[2] - corners[0];
+    bool isMirrored = (right.x * up.y < right.y * up.x) != (determinant(mat3(instances[found.instance].objectToWorld)) < 0.0);
     mat3 toWorld = mat3(instances[found.instance].objectToWorld);
     vec3 tangent = toWorld * mean;
     tangent -= dot(tangent, normal) * normal;
     float size = length(tangent);
     if (size < 1e-6 * length(toWorld[0])) return normal;
     tangent /= size;
-    float side = determinant(toWorld) < 0.0 ? -first.w : first.w;
-    return normalize(bump.x * tangent + bump.y * side * cross(normal, tangent) + bump.z * normal);
+    vec3 bitangent = isMirrored ? cross(tangent, normal) : cross(normal, tangent);
+    return normalize(bump.x * tangent + bump.y * bitangent + bump.z * normal);
 }
 
 #endif

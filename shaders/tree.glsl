@@ -232,19 +232,24 @@ void main()
             Dressed dressed = DressAt(materials[instances[found.instance].material], found, arrival.weights, sides);
             Material material = dressed.material;
             if (NORMAL_MAPS) arrival.normal = BumpedNormal(dressed.bump, arrival.normal, found, arrival.weights);
-            if (COATINGS && dressed.through == 0.0) material.kind = KIND_OPAQUE;
+            if (OPAQUE && COATINGS && dressed.through == 0.0) material.kind = KIND_OPAQUE;
             float wavelength = DISPERSION ? spectrum[line].w : D_LINE;
             Crossing crossing = CrossingOf(found, material, arrival.behind, branch.at, wavelength, disperses);
             Boundary boundary = crossing.boundary;
             bool isOpaque = crossing.isOpaque;
             bool isPane = crossing.isPane;
-            if (CUTOUTS && dressed.presence < 0.5) {
+            bool isThere = !CUTOUTS || dressed.presence >= 0.5;
+            if (!isThere) {
+                // The medium is another one beyond, but nothing shows that.
                 isOpaque = false;
                 crossing.passes = true;
-                boundary = Boundary(branch.at, branch.at);
             }
             bool passes = crossing.passes;
             branch.throughput *= Absorbed(boundary.before.medium, arrival.distance);
+            if (COATINGS && passes && isThere) {
+                if (OPAQUE && dressed.through < 1.0) Leave(chain, gathered, found, branch, line, dressed, 1.0 - dressed.through);
+                branch.throughput *= dressed.through * material.baseColor;
+            }
 
             vec3 wi = -direction;
             vec3 faceNormal = arrival.behind ? -arrival.faceNormal : arrival.faceNormal;

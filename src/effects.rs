@@ -312,6 +312,10 @@ impl Effect {
             (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows) => true,
             // A mirror lies over what is painted, and what blends is there or not.
             (Model::Tree, Self::Coatings | Self::Cutouts) => true,
+            // There is a table for a roughness, and none for an image of it.
+            (Model::Path, Self::EnergyCompensation) => {
+                any_dielectric(scene, |d| d.metallic_roughness_texture.is_some())
+            }
             (Model::Double, Self::Interior | Self::DirectLight) => true,
             (Model::Double, Self::Roughness) => any_dielectric(scene, |d| d.thin_walled && d.roughness > SMOOTH),
             _ => false,

@@ -124,9 +124,13 @@ const POINT_THROUGH_GLASS: &str = "light of point lights through smooth glass, a
 fn unseen(scene: &Scene, model: Model, effects: Effects) -> Vec<&'static str> {
     let as_smooth = |roughness: f64| roughness <= SMOOTH || !effects.contains(Effect::Roughness);
     let is_smooth = |surface: &Surface| match surface {
-        Surface::Dielectric(glass) => as_smooth(glass.roughness) && glass.ior != 1.0,
+        // An image may be smooth in places.
+        Surface::Dielectric(glass) => {
+            (as_smooth(glass.roughness) || glass.metallic_roughness_texture.is_some()) && glass.ior != 1.0
+        }
         Surface::Opaque(opaque) => {
-            let mirrors = opaque.roughness <= SMOOTH && opaque.specular.max(opaque.metallic) > 0.0;
+            let is_smooth = opaque.roughness <= SMOOTH || opaque.metallic_roughness_texture.is_some();
+            let mirrors = is_smooth && opaque.specular.max(opaque.metallic) > 0.0;
             mirrors && effects.contains(Effect::Opaque)
         }
     };

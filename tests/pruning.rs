@@ -174,13 +174,14 @@ impl Random {
             false => Surroundings::Image(self.panorama()),
         };
         if kind.dressed {
-            for part in &mut parts {
+            for (number, part) in parts.iter_mut().enumerate() {
                 part.mesh.uvs = part.mesh.positions.iter().map(|&[x, y, z]| [x + 0.3 * z, y - 0.2 * z]).collect();
                 let Surface::Dielectric(glass) = &mut part.surface else { continue };
-                if self.0.bool() {
+                if number == 0 || self.0.bool() {
+                    let transmission = if number == 0 { 0.5 } else { self.one_of(&[0.0, 0.5, 1.0]) };
                     glass.coating = Some(Box::new(Coating {
                         base_color: self.color(),
-                        transmission: self.one_of(&[0.0, 0.5, 1.0]),
+                        transmission,
                         transmission_texture: (kind.textured && self.0.bool()).then(|| TextureMap::of(0)),
                         ..Coating::default()
                     }));
@@ -189,12 +190,15 @@ impl Random {
         }
         let mut made = scene(parts);
         if kind.dressed {
-            for material in &mut made.materials {
+            // The first one has all there is, so that all scenes call for the same effects.
+            for (number, material) in made.materials.iter_mut().enumerate() {
+                let mut has = || number == 0 || self.0.bool();
+                let (is_bent, is_cut, is_blended, is_mapped) = (has(), has(), has(), has());
                 let scale = self.number(0.1, 1.0);
-                material.normal_map = self.0.bool().then(|| NormalMap { map: TextureMap::of(0), scale });
-                let cutoff = self.0.bool().then_some(0.5);
-                let map = self.0.bool().then(|| TextureMap::of(0));
-                material.cutout = self.0.bool().then(|| Cutout { alpha: 0.75, map, cutoff });
+                material.normal_map = is_bent.then(|| NormalMap { map: TextureMap::of(0), scale });
+                let map = is_mapped.then(|| TextureMap::of(0));
+                let cutoff = (!is_blended).then_some(0.5);
+                material.cutout = is_cut.then_some(Cutout { alpha: 0.75, map, cutoff });
             }
         }
         made.environment = Environment {

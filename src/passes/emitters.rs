@@ -19,10 +19,14 @@ fn header(count: u32, power: f32) -> Vec<u32> {
 /// Each triangle that shines, with its share of the light: its luminance times its area.
 pub(super) fn table(scene: &Scene, layout: &Layout, geometry: &Geometry) -> Vec<u32> {
     let mut shining = Vec::new();
+    let brightness = |surface: &Surface| match surface {
+        Surface::Opaque(opaque) => luminance(mean_emission(scene, opaque)),
+        Surface::Dielectric(_) => 0.0,
+    };
+    let brightness: Vec<f64> = scene.materials.iter().map(|material| brightness(&material.surface)).collect();
     for ((number, transform), &object) in (0..).zip(&geometry.transforms).zip(&geometry.objects) {
         let object = &scene.objects[object];
-        let Surface::Opaque(opaque) = &scene.materials[object.material].surface else { continue };
-        let brightness = luminance(mean_emission(scene, opaque));
+        let brightness = brightness[object.material];
         if brightness <= 0.0 {
             continue;
         }

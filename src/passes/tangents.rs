@@ -1,19 +1,18 @@
 //! Tangents of meshes, for maps of normals. In flow a mesh with texture coordinates, out flow numbers for `shaders/texture.glsl`.
 //!
-//! As where a file has none MikkTSpace would make them: of each vertex the mean over the triangles around, weighted by their angles.
-//! Vertices are those of the file, which splits them where coordinates do not go on.
+//! Of each vertex the mean over the triangles around, weighted by their angles, as MikkTSpace has it. Vertices are those of the file,
+//! which splits them where coordinates do not go on; where they are mirrored and it does not, the tangent is that of one side or none.
 
 use glam::{DVec2, DVec3};
 
 use crate::scene::Mesh;
 
-/// Two numbers a vertex: the direction in which u grows on the surface, as an octahedron has it (Cigolle et al. 2014), 4 added to the
-/// first where v grows to the other side than it would with an image that is not mirrored.
+/// Two numbers a vertex: the direction in which u grows on the surface, as an octahedron has it (Cigolle et al. 2014).
 pub(super) fn tangents(mesh: &Mesh) -> Vec<[f32; 2]> {
     if mesh.uvs.is_empty() {
         return vec![[1.0, 0.0]; mesh.positions.len()];
     }
-    let mut sums = vec![(DVec3::ZERO, 0.0); mesh.positions.len()];
+    let mut sums = vec![DVec3::ZERO; mesh.positions.len()];
     let place = |vertex: u32| DVec3::from_array(mesh.positions[vertex as usize].map(f64::from));
     let uv = |vertex: u32| DVec2::from_array(mesh.uvs[vertex as usize].map(f64::from));
     for &triangle in &mesh.triangles {
@@ -29,18 +28,11 @@ pub(super) fn tangents(mesh: &Mesh) -> Vec<[f32; 2]> {
         for (vertex, edges) in triangle.into_iter().zip([(b - a, c - a), (c - b, a - b), (a - c, b - c)]) {
             let angle = edges.0.angle_between(edges.1);
             if angle.is_finite() {
-                let (sum, side) = &mut sums[vertex as usize];
-                *sum += angle * along.normalize();
-                *side += angle * area.signum();
+                sums[vertex as usize] += angle * along.normalize();
             }
         }
     }
-    sums.into_iter()
-        .map(|(sum, side)| {
-            let [x, y] = octahedral(sum.normalize_or(DVec3::X));
-            [if side < 0.0 { x + 4.0 } else { x } as f32, y as f32]
-        })
-        .collect()
+    sums.into_iter().map(|sum| octahedral(sum.normalize_or(DVec3::X)).map(|x| x as f32)).collect()
 }
 
 /// A direction as a place on an octahedron that is folded open.
@@ -70,7 +62,7 @@ mod tests {
         let upright = square([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]);
         assert_eq!(tangents(&upright), [[1.0, 0.0]; 4]);
         let mirrored = square([[1.0, 0.0], [0.0, 0.0], [0.0, 1.0], [1.0, 1.0]]);
-        assert_eq!(tangents(&mirrored), [[3.0, 0.0]; 4]);
+        assert_eq!(tangents(&mirrored), [[-1.0, 0.0]; 4]);
         let turned = square([[0.0, 1.0], [0.0, 0.0], [1.0, 0.0], [1.0, 1.0]]);
         assert_eq!(tangents(&turned), [[0.0, 1.0]; 4]);
         // Where coordinates stand still there is none, and any is taken.

@@ -194,6 +194,7 @@ fn open_images(
         Surface::Dielectric(_) => None,
     };
     let replaces_color = color.is_some_and(|map| images[map.texture].replaces_color);
+    let shines = matches!(&material.surface, Surface::Opaque(opaque) if opaque.emission_texture.is_some());
     material.retain_maps(|map| match textures.open(files, &images[map.texture], warnings) {
         Ok(texture) => {
             map.texture = texture;
@@ -204,6 +205,12 @@ fn open_images(
             false
         }
     });
+    if let Surface::Opaque(Opaque { emission, emission_texture: None, .. }) = &mut material.surface
+        && shines
+    {
+        // Where an image does not say what shines nothing does.
+        *emission = DVec3::ZERO;
+    }
     if let Surface::Opaque(Opaque { base_color, base_color_texture: Some(_), .. }) = &mut material.surface
         && replaces_color
     {

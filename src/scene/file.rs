@@ -12,7 +12,7 @@ use super::material::Glass;
 use super::mesh_file::{self, Image, ImageSource};
 use super::render_table::options;
 use super::table::{
-    Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, Table, UNIT, text,
+    Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, STRENGTH, Table, UNIT, text,
 };
 use super::texture::Encoding;
 use super::{
@@ -178,7 +178,10 @@ impl Reader<'_> {
             Kind::Opaque => self.opaque(&table, base_color_texture, assembly)?,
         };
         let normal = self.texture(&table, "normal_texture", Encoding::Data, assembly)?;
-        let scale = table.or("normal_scale", 1.0, |entry| entry.number(&FINITE))?;
+        let scale = table.or("normal_scale", 1.0, |entry| match normal {
+            Some(_) => entry.number(&STRENGTH),
+            None => Err(entry.error("normal_scale needs a normal_texture, whose strength it is")),
+        })?;
         let cutout = match (table.get("alpha_cutoff"), base_color_texture) {
             (None, _) => None,
             (Some(entry), None) => {

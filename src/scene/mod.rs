@@ -187,7 +187,9 @@ impl Scene {
                 if let Some(ior) = overrides.ior {
                     dielectric.set_ior(ior);
                 }
-                dielectric.roughness = overrides.roughness.unwrap_or(dielectric.roughness);
+                if let Some(roughness) = overrides.roughness {
+                    (dielectric.roughness, dielectric.metallic_roughness_texture) = (roughness, None);
+                }
             }
         }
         let EnvironmentTable { light, intensity, rotation, visible } = environment;
@@ -257,19 +259,22 @@ fn panes_of_open_bodies(
     materials: &mut Vec<Material>,
     decided: &HashSet<usize>,
 ) -> HashSet<usize> {
-    let is_open = |object: &Object| meshes[object.mesh].holes > OPEN;
+    let is_open: Vec<bool> = objects
+        .iter()
+        .map(|object| meshes[object.mesh].holes > OPEN && joined_holes(object, objects, meshes) > OPEN)
+        .collect();
     let mut opened = HashSet::new();
     for number in 0..materials.len() {
         if materials[number].surface.body().is_none() || decided.contains(&number) {
             continue;
         }
-        let wearing = || objects.iter().filter(|object| object.material == number);
-        if !wearing().any(is_open) {
+        let wearing = || objects.iter().zip(&is_open).filter(|(object, _)| object.material == number);
+        if !wearing().any(|(_, open)| *open) {
             continue;
         }
-        opened.extend(wearing().filter(|object| is_open(object)).map(|object| object.mesh));
+        opened.extend(wearing().filter(|(_, open)| **open).map(|(object, _)| object.mesh));
         let mut pane = number;
-        if !wearing().all(is_open) {
+        if !wearing().all(|(_, open)| *open) {
             pane = materials.len();
             let own = materials[number].clone();
             materials.push(Material { name: format!("{}, thin-walled", own.name), ..own });
@@ -277,10 +282,22 @@ fn panes_of_open_bodies(
         if let Surface::Dielectric(glass) = &mut materials[pane].surface {
             glass.thin_walled = true;
         }
-        let worn = objects.iter_mut().filter(|object| object.material == number);
-        worn.filter(|object| meshes[object.mesh].holes > OPEN).for_each(|object| object.material = pane);
+        let worn = objects.iter_mut().zip(&is_open).filter(|(object, open)| object.material == number && **open);
+        worn.for_each(|(object, _)| object.material = pane);
     }
     opened
+}
+
+/// The share of holes of an object together with what else there is of it: a file cuts a bottle where its label begins.
+fn joined_holes(object: &Object, objects: &[Object], meshes: &[Arc<Mesh>]) -> f64 {
+    let is_part = |other: &&Object| (other.number, other.transform) == (object.number, object.transform);
+    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
+    for part in objects.iter().filter(is_part) {
+        let (mesh, first) = (&meshes[part.mesh], positions.len() as u32);
+        positions.extend(&mesh.positions);
+        triangles.extend(mesh.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + first)));
+    }
+    topology::share_of_holes(&positions, &triangles)
 }
 
 /// What is wrong with meshes, as far as it shows on what they are: only a medium wants a closed surface.

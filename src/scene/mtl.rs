@@ -10,8 +10,8 @@
 //! | `Kd`, `map_Kd`, `Pm`, `Ke` | base colour and its image, metallic, emission of an opaque surface |
 //! | `illum` 0 or 1, or black `Ks` | no specular reflection of an opaque surface |
 //! | `map_Ke` | image of the emission, multiplied by `Ke` unless that is black |
-//! | `norm`; `map_Bump` or `bump` with `-bm` | map of normals, of a grey image made from its heights, in texels; its strength |
-//! | `map_d` | the surface is not there where it is darker than a half |
+//! | `norm`; `map_Bump` or `bump` with `-bm` | map of normals; what does not look like one are heights, in texels; its strength |
+//! | `map_d` | the surface is not there where it is darker than a half, or its alpha below |
 //!
 //! A line that cannot be understood is left out with a remark, a value out of range is moved to the nearest end of the
 //! range with a remark: an MTL file is a by-product, and many are careless. `tobj` reads a text without such lines,
@@ -123,7 +123,8 @@ fn tidy_line(line: &str) -> Option<String> {
         "map_Bump" | "map_bump" | "bump" => image_name(rest).map(|name| {
             let words: Vec<_> = rest.split_whitespace().collect();
             let strength = words.array_windows().find(|[option, _]| *option == "-bm");
-            let strength = strength.and_then(|[_, number]| number.parse::<f32>().ok()).unwrap_or(1.0);
+            let strength = strength.and_then(|[_, number]| number.parse::<f32>().ok()).filter(|x| x.is_finite());
+            let strength = strength.unwrap_or(1.0).clamp(-1e3, 1e3);
             // Under names of our own, which tobj leaves as they are.
             format!("bump_strength {strength}\nbump_image {name}")
         }),

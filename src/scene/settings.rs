@@ -128,7 +128,9 @@ fn set_material(surface: &mut Surface, entry: Entry<'_>) -> Result<()> {
                     (ior, own) => (glass.ior, glass.dispersion) = (ior, own),
                 }
             }
-            glass.roughness = table.or("roughness", glass.roughness, |entry| entry.number(&UNIT))?;
+            if let Some(entry) = table.get("roughness") {
+                (glass.roughness, glass.metallic_roughness_texture) = (entry.number(&UNIT)?, None);
+            }
             glass.dispersion = table.or("dispersion", glass.dispersion, dispersion_of)?;
             glass.attenuation_color =
                 table.or("attenuation_color", glass.attenuation_color, |entry| entry.triple(&UNIT))?;

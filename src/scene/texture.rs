@@ -4,13 +4,14 @@ use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{DVec4, Vec3};
+use glam::{DVec3, DVec4, Vec3};
 use half::f16;
 
 use super::files::Files;
 use super::mesh_file::{Image, ImageSource};
 use crate::Result;
 use crate::image::{self, Numbers};
+use crate::optics::spectrum::luminance;
 
 /// An image that objects wear; row 0 is the top row.
 #[derive(Clone, Debug, PartialEq)]
@@ -43,7 +44,7 @@ pub enum Encoding {
     Color,
     /// Numbers, as they are.
     Data,
-    /// Heights of a surface where an image is grey, else a map of its normals.
+    /// A map of normals where an image looks like one, else heights of a surface, as bright as they are.
     Bump,
     /// How much of a surface is there; becomes alpha.
     Opacity,
@@ -57,16 +58,17 @@ impl Texture {
                 Encoding::Color => (width, height, Texels::Srgb(pixels)),
                 Encoding::Data => (width, height, Texels::Unorm(pixels)),
                 Encoding::Opacity => {
-                    let texel = |[r, _, _, a]: [u8; 4]| [255, 255, 255, (u16::from(r) * u16::from(a) / 255) as u8];
+                    // What has alpha says it with that.
+                    let has_alpha = pixels.iter().any(|[.., a]| *a < u8::MAX);
+                    let texel = |[r, g, b, a]: [u8; 4]| {
+                        let grey = luminance(DVec3::new(r.into(), g.into(), b.into())).round() as u8;
+                        [u8::MAX, u8::MAX, u8::MAX, if has_alpha { a } else { grey }]
+                    };
                     (width, height, Texels::Unorm(pixels.into_iter().map(texel).collect()))
                 }
                 Encoding::Bump => {
-                    let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
-                    let unit = |[code, ..]: [u8; 4]| f32::from(code) / 255.0;
-                    let texels = match is_grey {
-                        true => Texels::Linear(normals(&pixels.into_iter().map(unit).collect::<Vec<_>>(), width)),
-                        false => Texels::Unorm(pixels),
-                    };
+                    let numbers = pixels.iter().map(|texel| texel.map(|code| f32::from(code) / 255.0));
+                    let texels = bumps(numbers, width).map_or(Texels::Unorm(pixels), Texels::Linear);
                     (width, height, texels)
                 }
             },
@@ -76,21 +78,19 @@ impl Texture {
                     Encoding::Color => f16::from_f32(image::from_srgb(unit(code))),
                     Encoding::Data | Encoding::Bump | Encoding::Opacity => f16::from_f64(unit(code)),
                 };
-                let is_grey = pixels.iter().all(|[r, g, b, _]| r == g && g == b);
-                let texels = match encoding == Encoding::Bump && is_grey {
-                    true => {
-                        let heights: Vec<_> = pixels.iter().map(|[code, ..]| unit(*code) as f32).collect();
-                        normals(&heights, width)
-                    }
-                    false => {
-                        let alpha = |r: u16, a: u16| match encoding {
-                            Encoding::Opacity => unit(r) * unit(a),
-                            _ => unit(a),
-                        };
-                        let texel = |[r, g, b, a]: [u16; 4]| [value(r), value(g), value(b), f16::from_f64(alpha(r, a))];
-                        pixels.into_iter().map(texel).collect()
-                    }
+                let has_alpha = pixels.iter().any(|[.., a]| *a < u16::MAX);
+                let bumps = match encoding {
+                    Encoding::Bump => bumps(pixels.iter().map(|texel| texel.map(|code| unit(code) as f32)), width),
+                    _ => None,
                 };
+                let texel = |[r, g, b, a]: [u16; 4]| {
+                    let alpha = match encoding == Encoding::Opacity && !has_alpha {
+                        true => luminance(DVec3::new(unit(r), unit(g), unit(b))),
+                        false => unit(a),
+                    };
+                    [value(r), value(g), value(b), f16::from_f64(alpha)]
+                };
+                let texels = bumps.unwrap_or_else(|| pixels.into_iter().map(texel).collect());
                 (width, height, Texels::Linear(texels))
             }
             Numbers::Float(image) => {
@@ -102,8 +102,16 @@ impl Texture {
                         .push(format!("{}: {count} {what} no reflectance from 0 to 1, and moved there", name(path)));
                 }
                 let half = |value: f32| f16::from_f32(if value.is_nan() { 0.0 } else { value.clamp(0.0, 1.0) });
-                let texels = image.pixels.into_iter().map(|[r, g, b]| [half(r), half(g), half(b), f16::ONE]);
-                (image.width, image.height, Texels::Linear(texels.collect()))
+                let bumps = match encoding {
+                    Encoding::Bump => bumps(image.pixels.iter().map(|&[r, g, b]| [r, g, b, 1.0]), image.width),
+                    _ => None,
+                };
+                let texel = |[r, g, b]: [f32; 3]| {
+                    let alpha = if encoding == Encoding::Opacity { half(g) } else { f16::ONE };
+                    [half(r), half(g), half(b), alpha]
+                };
+                let texels = bumps.unwrap_or_else(|| image.pixels.into_iter().map(texel).collect());
+                (image.width, image.height, Texels::Linear(texels))
             }
         };
         Ok(Self { path: path.into(), width, height, texels })
@@ -112,10 +120,13 @@ impl Texture {
     /// Red, green, blue and alpha of each texel, linear.
     pub fn linear(&self) -> Box<dyn Iterator<Item = [f32; 4]> + '_> {
         match &self.texels {
-            Texels::Srgb(texels) => Box::new(texels.iter().map(|&[r, g, b, a]| {
-                let [r, g, b] = [r, g, b].map(image::decode_srgb);
-                [r, g, b, f32::from(a) / 255.0]
-            })),
+            Texels::Srgb(texels) => {
+                let table: [f32; 256] = std::array::from_fn(|code| image::decode_srgb(code as u8));
+                Box::new(texels.iter().map(move |&[r, g, b, a]| {
+                    let [r, g, b] = [r, g, b].map(|code| table[usize::from(code)]);
+                    [r, g, b, f32::from(a) / 255.0]
+                }))
+            }
             Texels::Unorm(texels) => Box::new(texels.iter().map(|texel| texel.map(|code| f32::from(code) / 255.0))),
             Texels::Linear(texels) => Box::new(texels.iter().map(|texel| texel.map(f16::to_f32))),
         }
@@ -131,6 +142,19 @@ impl Texture {
     pub fn name(&self) -> String {
         name(&self.path)
     }
+}
+
+/// Normals of texels that are heights; nothing where they are normals themselves: those are mostly blue, and red and
+/// green are a half in the mean.
+fn bumps(texels: impl ExactSizeIterator<Item = [f32; 4]> + Clone, width: u32) -> Option<Vec<[f16; 4]>> {
+    let wide = |[r, g, b, _]: [f32; 4]| Vec3::new(r, g, b).as_dvec3();
+    let mean = texels.clone().map(wide).sum::<DVec3>() / texels.len().max(1) as f64;
+    let is_half = |x: f64| (x - 0.5).abs() < 0.15;
+    if is_half(mean.x) && is_half(mean.y) && mean.z > 0.65 {
+        return None;
+    }
+    let heights: Vec<f32> = texels.map(|texel| luminance(wide(texel)) as f32).collect();
+    Some(normals(&heights, width))
 }
 
 /// The normals of heights, of which 1 is as high as a texel is wide; encoded as in an image, which repeats.

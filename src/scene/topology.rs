@@ -3,7 +3,7 @@
 //!
 //! Vertices are welded by exact position first: files split vertices where normals or texture coordinates differ.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 
 use glam::DVec3;
 
@@ -57,6 +57,13 @@ pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut Mesh
         holes: holes(positions, triangles, &open),
         inverted: inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect(),
     }
+}
+
+/// The area of the holes of a surface, over its own.
+pub fn share_of_holes(positions: &[[f32; 3]], triangles: &[[u32; 3]]) -> f64 {
+    let mut open = Vec::new();
+    pieces(positions, triangles, &mut MeshFaults::default(), &mut FaultSites::default(), &mut open);
+    holes(positions, triangles, &open)
 }
 
 /// The pieces of a surface.
@@ -127,7 +134,8 @@ fn holes(positions: &[[f32; 3]], triangles: &[[u32; 3]], open: &[[u32; 2]]) -> f
         let (one, other) = (root(&mut parent, from), root(&mut parent, to));
         parent.insert(one.max(other), one.min(other));
     }
-    let mut rims: HashMap<u32, DVec3> = HashMap::new();
+    // Summed up in one order.
+    let mut rims: BTreeMap<u32, DVec3> = BTreeMap::new();
     for &[from, to] in open {
         let rim = root(&mut parent, from);
         let origin = place(positions, rim);

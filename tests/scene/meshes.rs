@@ -321,6 +321,15 @@ fn open_bodies_are_panes() {
     let scene = folder.load("box.obj").unwrap();
     assert!(pane(&scene, 0) && scene.warnings[0].contains("its holes are 35 % of its area"), "{:?}", scene.warnings);
 
+    // A body that is cut where another material begins is none less.
+    folder.write("two.mtl", "newmtl glass\nillum 7\nnewmtl label\nKd 1 0 0\n");
+    folder.write(
+        "cut.obj",
+        format!("mtllib two.mtl\nusemtl glass\n{}", TETRAHEDRON.replace("f 2 3 4", "usemtl label\nf 2 3 4")),
+    );
+    let scene = folder.scene("[[object]]\nmesh = \"cut.obj\"\n").unwrap();
+    assert!(!pane(&scene, 0) && scene.objects.len() == 2, "{:?}", scene.warnings);
+
     // One material, worn by a closed body and by a sheet.
     let both = |material: &str| {
         let objects =

@@ -92,7 +92,7 @@ impl<'a> Converter<'a> {
             let transform = normal.extension_value("KHR_texture_transform").cloned();
             let transform = transform.and_then(|json| serde_json::from_value(json).ok());
             let map = self.place(&normal.texture(), set, transform, Encoding::Data, &name)?;
-            Some(NormalMap { map, scale: f64::from(normal.scale()) })
+            Some(NormalMap { map, scale: self.within(&name, "the scale of normalTexture", normal.scale(), -1e3, 1e3) })
         });
         let [.., alpha] = pbr.base_color_factor();
         let alpha = self.within(&name, "the alpha of baseColorFactor", alpha, 0.0, 1.0);
@@ -191,6 +191,11 @@ impl<'a> Converter<'a> {
             Some(0.0) => ENDLESS,
             Some(ior) => self.within(name, "ior", ior, 1.0, ENDLESS),
         };
+        let is_dark = emission_texture.is_some();
+        let emission_texture = emission_texture.and_then(|info| self.map(&info, Encoding::Color, name));
+        // Where an image does not say what shines nothing does.
+        let is_dark = is_dark && emission_texture.is_none();
+        let emission = if is_dark { [0.0; 3] } else { emission };
         Opaque {
             base_color,
             base_color_texture: common.color_map,
@@ -200,7 +205,7 @@ impl<'a> Converter<'a> {
             ior,
             specular: self.within(name, "specularFactor", specular, 0.0, 1.0),
             emission: self.color(name, "emissiveFactor times emissiveStrength", emission, 1e9),
-            emission_texture: emission_texture.and_then(|info| self.map(&info, Encoding::Color, name)),
+            emission_texture,
         }
     }
 
