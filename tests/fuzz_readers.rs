@@ -204,11 +204,12 @@ fn peak_kib() -> u64 {
 }
 
 const OBJ: &str = "mtllib fuzz.mtl\no body\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -1 1 -1\nv -1 -1 1\nv 1 -1 1 1.0\nv 1 1 1 0.5 0.5 0.5\n\
-    v -1 1 1\nvt 0 0\nvt 1 0 0\nvn 0 0 -1\nvn 0 0 1\nusemtl glass\ng front\nf 1//1 4//1 3//1 2//1\nf -4//2 -3//2 -2//2 -1//2\n\
+    v -1 1 1\nvt 0 0\nvt 1 0 0\nvn 0 0 -1\nvn 0 0 1\nusemtl glass\ng front\ns 1\nf 1//1 4//1 3//1 2//1\nf -4//2 -3//2 -2//2 -1//2\n\
     usemtl red\nf 1/1 2/2 6/1 5/2\nf 2 3 7 6\no rest\nf 3/1/1 4/2/1 8/1/2 \\\n7/2/2\nf 4 1 5 8\nl 1 2 3\np 1\n# end\n";
 
 const MTL: &str = "newmtl glass\nillum 7\nNi 1.5\nd 0.5\nTr 0.5\nTf 1 0.9 0.8\nPr 0.1\nKd 0 0 0\n\nnewmtl red\nKd 1 0 0\nKs 1 1 1\n\
-    Ke 0 0 1\nNs 100\nPm 0.5\nillum 2\nmap_Kd -s 1 1 1 -o 0 0 tex.png\nbump b.png\n";
+    Ke 0 0 1\nNs 100\nPm 0.5\nillum 2\nmap_Kd -s 1 1 1 -o 0 0 tex.png\nmap_Bump -bm 0.5 tex.png\n\
+    map_d tex.png\nmap_Ke tex.png\nnorm tex.png\n";
 
 const TOML: &str = "[environment]\ncolor = [1, 1, 1]\nintensity = 1.0\nrotation = 0.0\nvisible = true\n\n[camera]\n\
     position = [0.0, 0.25, 0.9]\ntarget = [0.0, 0.1, 0.0]\nup = [0.0, 1.0, 0.0]\nvertical_fov = 35.0\n\n[render]\n\
@@ -319,14 +320,16 @@ fn model() -> gltf::Model {
     let transform = json!({ "offset": [0.5, 0.5], "rotation": 0.5, "scale": [2, 2] });
     model.push(
         "materials",
-        json!({ "name": "wood", "emissiveFactor": [1, 1, 1], "pbrMetallicRoughness": {
+        json!({ "name": "wood", "emissiveFactor": [1, 1, 1], "emissiveTexture": { "index": 0 }, "alphaMode": "MASK",
+        "normalTexture": { "index": 0, "scale": 0.5, "extensions": { "KHR_texture_transform": { "rotation": 1 } } },
+        "pbrMetallicRoughness": { "metallicRoughnessTexture": { "index": 0, "texCoord": 1 },
         "baseColorFactor": [0.5, 0.5, 0.5, 1], "metallicFactor": 0, "roughnessFactor": 0.5, "baseColorTexture": {
             "index": 0, "extensions": { "KHR_texture_transform": transform } } } }),
     );
     model.push(
         "materials",
-        json!({ "name": "glass", "pbrMetallicRoughness": { "metallicFactor": 0 }, "extensions": {
-        "KHR_materials_transmission": { "transmissionFactor": 1 }, "KHR_materials_ior": { "ior": 1.5 },
+        json!({ "name": "glass", "alphaMode": "BLEND", "pbrMetallicRoughness": { "metallicFactor": 0 }, "extensions": {
+        "KHR_materials_transmission": { "transmissionFactor": 1, "transmissionTexture": { "index": 0 } }, "KHR_materials_ior": { "ior": 1.5 },
         "KHR_materials_volume": { "thicknessFactor": 1, "attenuationColor": [1, 0.5, 0.5], "attenuationDistance": 1 },
         "KHR_materials_dispersion": { "dispersion": 0.5 } } }),
     );
@@ -474,8 +477,23 @@ fn generated_scene(random: &mut Random) -> String {
             "attenuation_distance",
             "thin_walled",
             "priority",
+            "transmission",
+            "transmission_texture",
+            "normal_texture",
+            "normal_scale",
         ],
-        &["kind", "base_color", "metallic", "roughness", "specular", "emission", "base_color_texture"],
+        &[
+            "kind",
+            "base_color",
+            "metallic",
+            "roughness",
+            "specular",
+            "emission",
+            "base_color_texture",
+            "metallic_roughness_texture",
+            "emission_texture",
+            "alpha_cutoff",
+        ],
         &["mesh", "material", "translate", "rotate", "scale", "smooth"],
     ];
     const HEADERS: [&str; 6] = ["[environment]", "[camera]", "[[light]]", "[material.a]", "[material.b]", "[[object]]"];
@@ -529,7 +547,9 @@ fn fitting(random: &mut Random, key: &str, header: &str) -> String {
         "position" | "target" | "up" | "color" | "base_color" | "emission" | "attenuation_color" | "translate"
         | "rotate" | "scale" => format!("[{}, {}, {}]", number(random), number(random), number(random)),
         "image" => "\"none.png\"".into(),
-        "base_color_texture" => "\"tex.png\"".into(),
+        "transmission" | "alpha_cutoff" => "0.5".into(),
+        "normal_scale" => "2".into(),
+        texture if texture.ends_with("_texture") => "\"tex.png\"".into(),
         _ => number(random),
     }
 }
