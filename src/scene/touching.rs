@@ -2,6 +2,8 @@
 //!
 //! Which of two such walls a ray meets first is up to rounding: liquid in a glass has to overlap its wall, or to stay clear of it.
 
+use std::collections::HashMap;
+
 use glam::DVec3;
 
 use super::walls::{Walls, lies_on, middle, normal};
@@ -33,7 +35,14 @@ impl Scene {
         let meet = pairs.filter(|&(a, b)| a == b || bounds[a].intersects(&bounds[b])).take(MOST_PAIRS);
         let mut walls: Vec<Option<Walls>> = bodies.iter().map(|_| None).collect();
         let mut found = Vec::new();
+        // What lies on itself does so wherever it stands.
+        let mut alone: HashMap<usize, usize> = HashMap::new();
         for (a, b) in meet {
+            let mesh = self.objects[bodies[a]].mesh;
+            if let (true, Some(&triangles)) = (a == b, alone.get(&mesh)) {
+                found.extend((triangles > 0).then_some(Touch { objects: [bodies[a]; 2], triangles }));
+                continue;
+            }
             for body in [a, b] {
                 let object = &self.objects[bodies[body]];
                 walls[body].get_or_insert_with(|| Walls::new(&self.meshes[object.mesh], &object.transform));
@@ -43,6 +52,9 @@ impl Scene {
             // Of large triangles under small ones the middle may lie elsewhere.
             let (some, others) =
                 (first.on(second, near, &bounds[b], a == b), second.on(first, near, &bounds[a], a == b));
+            if a == b {
+                alone.insert(mesh, some);
+            }
             if some.max(others) > 0 {
                 let objects = if some >= others { [a, b] } else { [b, a] }.map(|body| bodies[body]);
                 found.push(Touch { objects, triangles: some.max(others) });

@@ -12,8 +12,9 @@ use super::super::walls::{Walls, bounds, middle};
 use super::{Ailment, Finding, parts};
 use crate::parallel;
 
-/// Pairs of triangles whose boxes meet that are looked at: some seconds.
+/// Pairs of triangles whose boxes meet that are looked at: some seconds, or so many for each triangle.
 const MOST_TESTS: usize = 100_000_000;
+const MOST_TESTS_OF_ONE: usize = 64;
 
 /// The triangles of a mesh that cross others of it.
 pub struct Crossings {
@@ -45,7 +46,7 @@ pub fn tolerance(bounds: &Bounds) -> f64 {
 pub fn within(walls: &Walls, corners: &[[u32; 3]], bounds: Bounds) -> Crossings {
     let tolerance = tolerance(&bounds);
     let parts = parts(corners.len());
-    let budget = MOST_TESTS / parts.len().max(1);
+    let budget = MOST_TESTS.max(MOST_TESTS_OF_ONE * corners.len()) / parts.len().max(1);
     let found = parallel::map(parallel::threads(), parts, |part| {
         let (mut pairs, mut left) = (Vec::new(), budget);
         for number in part {
