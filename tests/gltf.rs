@@ -176,6 +176,9 @@ fn the_same_scene_makes_the_same_picture() {
         let found = load(&path);
         assert_eq!(found.warnings, Vec::<String>::new());
         assert_eq!((found.camera.position, found.lights.clone()), (wanted.camera.position, wanted.lights.clone()));
+        // It turns around what it looks at.
+        let middle = found.bounds().expect("objects").center();
+        assert_eq!(found.camera.target, DVec3::new(0.0, 0.25, middle.z));
         assert_eq!(found.meshes.len(), 3, "one mesh, wherever it stands");
         for transport in [Transport::Path, Transport::Double] {
             let [a, b] = [&wanted, &found].map(|scene| picture(&validated, scene, transport, 4).radiance);

@@ -24,6 +24,17 @@ pub const DEFAULT_FOV: f64 = 35.0;
 const MARGIN: f64 = 1.1;
 
 impl Camera {
+    /// The same picture, with the target in its middle as far off as `point`, unless that lies behind.
+    #[must_use]
+    pub fn aimed_at(&self, point: DVec3) -> Self {
+        let forward = (self.target - self.position).normalize();
+        let distance = (point - self.position).dot(forward);
+        let target = self.position + forward * distance;
+        // Of next to no distance there is no direction.
+        let is_the_same = (target - self.position).normalize_or_zero().dot(forward) > 1.0 - 1e-9;
+        Self { target: if is_the_same { target } else { self.target }, ..*self }
+    }
+
     /// A camera that sees something; the error says what would be right.
     pub fn new(position: DVec3, target: DVec3, up: DVec3, vertical_fov: f64) -> Result<Self, String> {
         let forward = (target - position).try_normalize().ok_or("position and target must be different points")?;

@@ -373,6 +373,8 @@ fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
     let place = Placement { number, transform: DAffine3::IDENTITY, smooth: true };
     let MeshFile { camera, lights, scene_warnings, .. } = assembly.add(Files::Disk, path, wear, &place)?;
     let (camera, lights, mut warnings) = (*camera, std::mem::take(lights), std::mem::take(scene_warnings));
+    // A file's camera looks along a direction: what it turns around lies as far off as the middle of the scene.
+    let camera = camera.map(|camera| camera.aimed_at(assembly.bounds().center()));
     assembly.warnings.append(&mut warnings);
     assembly.check_reach(0).map_err(|message| Error::input(path, 0, message))?;
     let (environment, render) = (EnvironmentTable::default(), RenderArgs::default());
