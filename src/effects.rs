@@ -628,6 +628,14 @@ mod tests {
         assert!(Effect::all().all(|effect| effect.callers(&scene).next().is_none()));
     }
 
+    #[test]
+    fn the_scene_of_every_effect_calls_for_every_effect() {
+        let scene = Scene::of_every_effect().expect("a scene");
+        for effect in Effect::all() {
+            assert!(effect.called_for_by(&scene), "{effect:?}");
+        }
+    }
+
     /// Meshes' files hold 32 bits: 1.45 comes as 1.4500000476837158.
     #[test]
     fn callers_tell_short_numbers() {

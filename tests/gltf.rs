@@ -364,6 +364,17 @@ fn maps_are_where_materials_have_them() {
     };
     assert_eq!(coating.as_deref(), Some(&wanted));
     assert_eq!(scene.materials[0].cutout, Some(Cutout { alpha: 0.5, map: None, cutoff: None }));
+    // Metal lets nothing through.
+    let mut metal = json!({ "extensions": { "KHR_materials_transmission": { "transmissionFactor": 1 } } });
+    metal["name"] = json!("tin");
+    model.json["materials"][0] = metal;
+    let scene = loaded(&model);
+    assert!(matches!(scene.materials[0].surface, Surface::Opaque(_)));
+    assert!(
+        scene.warnings.iter().any(|warning| warning.contains("\"tin\": metallicFactor is 1")),
+        "{:?}",
+        scene.warnings
+    );
 }
 
 /// Names of one's own are no fault, and arrays may serve many primitives.

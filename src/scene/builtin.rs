@@ -14,7 +14,7 @@ pub const EVERY_EFFECT: &str = "built-in/validation/all.toml";
 pub const CLEAR_GLASS: &str = "built-in/validation/plain.toml";
 
 /// The files, by their path.
-const FILES: [(&str, &[u8]); 14] = [
+const FILES: [(&str, &[u8]); 15] = [
     (SCENE, include_bytes!("../../assets/scenes/teapot.toml")),
     (ENVIRONMENT, include_bytes!("../../assets/environments/city.exr")),
     ("built-in/meshes/teapot_body.obj", include_bytes!("../../assets/meshes/teapot_body.obj")),
@@ -29,6 +29,7 @@ const FILES: [(&str, &[u8]); 14] = [
     ("built-in/validation/floor.obj", include_bytes!("../../assets/validation/floor.obj")),
     ("built-in/validation/lamp.obj", include_bytes!("../../assets/validation/lamp.obj")),
     ("built-in/validation/checker.png", include_bytes!("../../assets/validation/checker.png")),
+    ("built-in/validation/leaf.png", include_bytes!("../../assets/validation/leaf.png")),
 ];
 
 /// The bytes of the file at `path`, which holds neither `.` nor `..`.

@@ -187,6 +187,11 @@ impl Reader<'_> {
             (Some(entry), None) => {
                 return Err(entry.error("alpha_cutoff needs a base_color_texture, whose alpha it is about"));
             }
+            (Some(_), Some(map)) if !assembly.textures.all[map.texture].has_alpha() => {
+                let image = assembly.textures.all[map.texture].name();
+                assembly.warnings.push(format!("material {:?}: {image} has no alpha; nothing is cut out", entry.key));
+                None
+            }
             (Some(entry), map) => Some(Cutout { alpha: 1.0, map, cutoff: Some(entry.number(&UNIT)?) }),
         };
         let normal_map = normal.map(|map| NormalMap { map, scale });

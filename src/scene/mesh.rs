@@ -65,8 +65,8 @@ pub struct RawMesh {
 pub struct Preparation {
     /// It is mended.
     pub repair: bool,
-    /// Normals that it lacks are made across edges of at most so many radians; 0: it stays without.
-    pub smooth_angle: f64,
+    /// Normals that it lacks are made across edges of at most so many radians, whatever smoothing groups say.
+    pub smooth_angle: Option<f64>,
 }
 
 /// What was wrong with a mesh, as counts.
@@ -251,7 +251,9 @@ impl Mesh {
     /// The same of what is prepared first.
     pub fn prepared(mut raw: RawMesh, preparation: Preparation) -> Result<Self, Refusal> {
         let mending = if preparation.repair { mend(&mut raw) } else { Mending::default() };
-        smooth(&mut raw, preparation.smooth_angle);
+        if let Some(angle) = preparation.smooth_angle {
+            smooth(&mut raw, angle);
+        }
         Ok(Self { mending, ..Self::new(raw)? })
     }
 

@@ -179,6 +179,14 @@ impl Scene {
         let mut files = assembly.files();
         let Assembly { meshes, mut objects, mut materials, textures, decided, mut warnings, .. } = assembly;
         let textures = textures.all;
+        for material in &mut materials {
+            // Most files that blend have nothing to blend.
+            let is_whole = |cutout: &Cutout| {
+                let has_alpha = cutout.map.is_some_and(|map| textures[map.texture].has_alpha());
+                !has_alpha && cutout.alpha >= cutout.cutoff.unwrap_or(1.0)
+            };
+            material.cutout = material.cutout.filter(|cutout| !is_whole(cutout));
+        }
         let opened = panes_of_open_bodies(&mut objects, &meshes, &mut materials, &decided);
         warnings.splice(0..0, faults_of_meshes(&objects, &meshes, &materials, &opened));
         warn_of_missing_uvs(&objects, &meshes, &materials, &textures, &mut warnings);
@@ -321,7 +329,9 @@ fn faults_of_meshes(
         }
         let advice = if is_pane {
             let holes = (mesh.holes * 100.0).round();
-            format!("; its holes are {holes} % of its area: it bounds no medium and is rendered thin-walled")
+            format!(
+                "; its holes are {holes} % of its area: it bounds no medium and counts as thin_walled = true, unless its [material] or --set has another"
+            )
         } else if bounds_medium && !faults.is_closed() {
             "; the surface is not closed and bounds no medium well: --repair may close it, or it wants thin_walled = true"
                 .into()
@@ -399,7 +409,7 @@ impl Overrides {
     fn preparation(&self, own: &Self) -> Preparation {
         Preparation {
             repair: self.repair.or(own.repair).unwrap_or(false),
-            smooth_angle: self.smooth_angle.or(own.smooth_angle).unwrap_or(0.0).to_radians(),
+            smooth_angle: self.smooth_angle.or(own.smooth_angle).map(f64::to_radians),
         }
     }
 

@@ -167,8 +167,11 @@ impl Converter<'_> {
     fn convert(mut self) -> Material {
         let surface =
             if self.is_dielectric() { Surface::Dielectric(self.dielectric()) } else { Surface::Opaque(self.opaque()) };
-        if let Some(key) = ["map_Pr", "map_Pm"].into_iter().find(|key| self.material.unknown_param.contains_key(*key)) {
-            self.remark(&format!("{key} is not read; its number is used"));
+        if let Some(key) = ["map_Pr", "map_Pm", "map_Ks", "map_Ns", "map_Tr"]
+            .into_iter()
+            .find(|key| self.material.unknown_param.contains_key(*key))
+        {
+            self.remark(&format!("{key} is not read; the number is used"));
         }
         let mut material = Material::new(self.material.name.clone(), surface);
         material.normal_map = self.normal_map();

@@ -83,8 +83,10 @@ fn parts(
     let mut lost = 0;
     for (mut part, material) in raw {
         if grouped {
-            // Vertices are those of their groups: the faces around each are smooth.
-            average(&mut part);
+            match preparation.smooth_angle {
+                None => average(&mut part),
+                Some(_) => part.normals.clear(),
+            }
         }
         part.name = if several { format!("{file} ({})", part.name) } else { file.to_owned() };
         match Mesh::prepared(part, preparation) {

@@ -23,8 +23,8 @@ pub struct Tidy {
     pub materials: Vec<String>,
     /// What was left out, one line each.
     pub remarks: Vec<String>,
-    /// Whether there are smoothing groups and no normals: each corner has one of zero then, one for each group and one for each face
-    /// that is in none.
+    /// Whether there are smoothing groups and no normals: that of each corner is the number of its group then, those of faces in none being
+    /// groups of their own.
     pub grouped: bool,
     /// How many groups there are.
     groups: usize,
@@ -136,9 +136,9 @@ impl Tidy {
         }
         self.grouped = counts[2] == 0 && !groups.numbers.is_empty();
         if self.grouped {
-            // One is there already.
-            for _ in 1..groups.numbers.len() + groups.flat {
-                self.text.push_str("vn 0 0 0\n");
+            // One is there already. By their numbers they are known again.
+            for number in 1..groups.numbers.len() + groups.flat {
+                let _ = writeln!(self.text, "vn {number} 0 0");
             }
             self.groups = groups.numbers.len();
         }

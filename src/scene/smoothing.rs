@@ -63,16 +63,20 @@ pub fn smooth(raw: &mut RawMesh, angle: f64) {
     *raw = smooth;
 }
 
-/// Gives each vertex the mean normal of the faces around it, weighted by their angles.
+/// Gives each vertex the mean normal of the faces around its place, weighted by their angles: of those that are in its group, whose
+/// number stands where its normal should.
 pub fn average(raw: &mut RawMesh) {
-    let mut sums = vec![DVec3::ZERO; raw.positions.len()];
+    let welded = weld(&raw.positions);
+    let key = |vertex: usize| (welded[vertex], raw.normals[vertex][0].to_bits());
+    let mut sums: HashMap<(u32, u32), DVec3> = HashMap::new();
     for &triangle in &raw.triangles {
         let face = area_vector(&raw.positions, triangle).normalize_or_zero();
         for (vertex, angle) in triangle.into_iter().zip(angles(&raw.positions, triangle)) {
-            sums[vertex as usize] += angle * face;
+            *sums.entry(key(vertex as usize)).or_insert(DVec3::ZERO) += angle * face;
         }
     }
-    raw.normals = sums.into_iter().map(|sum| sum.normalize_or_zero().as_vec3().to_array()).collect();
+    let normal = |vertex| sums.get(&key(vertex)).map_or(DVec3::ZERO, |sum| sum.normalize_or_zero());
+    raw.normals = (0..raw.normals.len()).map(|vertex| normal(vertex).as_vec3().to_array()).collect();
 }
 
 /// The angles of a triangle at its corners, 0 where there is none.

@@ -132,6 +132,14 @@ impl Texture {
         }
     }
 
+    /// Whether any texel has an alpha below 1.
+    pub fn has_alpha(&self) -> bool {
+        match &self.texels {
+            Texels::Srgb(texels) | Texels::Unorm(texels) => texels.iter().any(|[.., alpha]| *alpha < u8::MAX),
+            Texels::Linear(texels) => texels.iter().any(|[.., alpha]| *alpha < f16::ONE),
+        }
+    }
+
     /// The mean of each channel.
     pub fn mean(&self) -> DVec4 {
         let sum: DVec4 = self.linear().map(|texel| DVec4::from_array(texel.map(f64::from))).sum();

@@ -15,7 +15,7 @@ fn what_is_wrong_with_a_mesh_is_told_with_counts() {
         folder.load("mesh.obj")
     };
     let open = load(TETRAHEDRON.replace("f 2 3 4\n", "f 2 2 3\n")).unwrap();
-    let expected = "mesh.obj: 3 open edges, 1 degenerate triangle removed; its holes are 58 % of its area: it bounds no medium and is rendered thin-walled";
+    let expected = "mesh.obj: 3 open edges, 1 degenerate triangle removed; its holes are 58 % of its area: it bounds no medium and counts as thin_walled = true, unless its [material] or --set has another";
     assert_eq!(open.warnings[0], expected);
     let inverted = load(
         TETRAHEDRON
@@ -309,8 +309,7 @@ fn open_bodies_are_panes() {
     let pane = |scene: &Scene, index| dielectric(scene, index).thin_walled;
     let scene = folder.load("sheet.obj").unwrap();
     assert!(pane(&scene, 0));
-    let expected =
-        "sheet.obj: 4 open edges; its holes are 100 % of its area: it bounds no medium and is rendered thin-walled";
+    let expected = "sheet.obj: 4 open edges; its holes are 100 % of its area: it bounds no medium and counts as thin_walled = true, unless its [material] or --set has another";
     assert!(scene.warnings.contains(&expected.into()), "{:?}", scene.warnings);
     // A box without two sides that meet: over both a sheet would bend.
     folder.write(
@@ -370,6 +369,9 @@ fn smoothing_groups_make_normals() {
     assert!(mesh(&format!("s off\n{one}\n{other}\n")).0.normals.is_empty());
     assert_eq!(ridge(&format!("s 1\n{one}\n{other}\n")), [[0, 1000, 0]]);
     let sharp = [[-707, 707, 0], [707, 707, 0]];
+    // A seam of texture coordinates is none of the surface.
+    let seam = "vt 0 0\nvt 1 0\ns 1\nf 4/1 3/1 2/1 1/1\nf 3/2 6/2 5/2 2/2\n";
+    assert_eq!(ridge(seam), [[0, 1000, 0]]);
     assert_eq!(ridge(&format!("s 1\n{one}\ns 2\n{other}\n")), sharp);
     assert_eq!(ridge(&format!("s 1\n{one}\ns 0\n{other}\n")), sharp);
     assert_eq!(ridge(&format!("{other}\ns 1\n{one}\n")), sharp);

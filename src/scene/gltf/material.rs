@@ -80,6 +80,11 @@ impl<'a> Converter<'a> {
             let transmission = self.within(&name, "transmissionFactor", transmission, 0.0, 1.0);
             // Where metal is everywhere nothing gets through.
             let lets_through = transmission > 0.0 && (metallic < 1.0 || map.is_some());
+            if transmission > 0.0 && !lets_through {
+                self.remarks.say(format!(
+                    "material {name:?}: metallicFactor is 1, and metal lets nothing through: transmissionFactor {transmission} has no effect"
+                ));
+            }
             let common = Common { metallic, roughness, map, color_map, transmission };
             match lets_through {
                 true => Surface::Dielectric(self.dielectric(source, &name, &common)),
@@ -108,8 +113,6 @@ impl<'a> Converter<'a> {
             }
             AlphaMode::Blend => Some(Cutout { alpha, map: color_map, cutoff: None }),
         };
-        // Most files with BLEND have nothing to blend.
-        let cutout = cutout.filter(|cutout| cutout.alpha < 1.0 || cutout.map.is_some());
         (Material { name, surface, normal_map, cutout }, self.set.unwrap_or(0))
     }
 
