@@ -12,7 +12,8 @@ use super::material::Glass;
 use super::mesh_file::{self, Image, ImageSource};
 use super::render_table::options;
 use super::table::{
-    Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, POSITIVE_OR_INFINITE, SCALE, STRENGTH, Table, UNIT, text,
+    Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, NO_NORMALS, POSITIVE_OR_INFINITE, SCALE, STRENGTH, Table,
+    UNIT, text,
 };
 use super::texture::Encoding;
 use super::{
@@ -180,7 +181,7 @@ impl Reader<'_> {
         let normal = self.texture(&table, "normal_texture", Encoding::Data, assembly)?;
         let scale = table.or("normal_scale", 1.0, |entry| match normal {
             Some(_) => entry.number(&STRENGTH),
-            None => Err(entry.error("normal_scale needs a normal_texture, whose strength it is")),
+            None => Err(entry.error(NO_NORMALS)),
         })?;
         let cutout = match (table.get("alpha_cutoff"), base_color_texture) {
             (None, _) => None,

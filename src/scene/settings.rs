@@ -7,7 +7,9 @@ use glam::DVec3;
 use toml::de::DeTable;
 
 use super::file::{DIELECTRIC_KEYS, OPAQUE_KEYS, dispersion_of, index_of};
-use super::table::{Document, Entry, FIELD, FINITE, LENGTH, LIGHT, POSITIVE_OR_INFINITE, Table, UNIT};
+use super::table::{
+    Document, Entry, FIELD, FINITE, LENGTH, LIGHT, NO_NORMALS, POSITIVE_OR_INFINITE, STRENGTH, Table, UNIT,
+};
 use super::{Camera, Dielectric, Dispersion, Environment, GLASSES, Material, Opaque, Scene, Surface};
 use crate::{Error, Result};
 
@@ -55,7 +57,7 @@ impl Scene {
         if let Some(entry) = root.get("material") {
             for entry in entry.any_table("material.NAME")?.entries() {
                 let chosen = chosen(&self.materials, entry)?;
-                set_material(&mut self.materials[chosen].surface, entry)?;
+                set_material(&mut self.materials[chosen], entry)?;
             }
         }
         Ok(())
@@ -118,10 +120,18 @@ fn chosen(materials: &[Material], entry: Entry<'_>) -> Result<usize> {
     }
 }
 
-fn set_material(surface: &mut Surface, entry: Entry<'_>) -> Result<()> {
-    match surface {
+fn set_material(material: &mut Material, entry: Entry<'_>) -> Result<()> {
+    let table = match &mut material.surface {
         Surface::Dielectric(glass) => {
-            let table = entry.table("material.NAME", &DIELECTRIC_KEYS)?;
+            let own = ["base_color", "transmission", "normal_scale"];
+            let table = entry.table("material.NAME", &[&DIELECTRIC_KEYS[..], &own].concat())?;
+            if let Some(entry) = table.get("base_color") {
+                let coating = glass.coating.get_or_insert_default();
+                (coating.base_color, coating.base_color_texture) = (entry.triple(&UNIT)?, None);
+            }
+            if let Some(entry) = table.get("transmission") {
+                glass.coating.get_or_insert_default().transmission = entry.number(&UNIT)?;
+            }
             if let Some(entry) = table.get("ior") {
                 match index_of(entry)? {
                     (ior, Dispersion::None) => glass.set_ior(ior),
@@ -138,9 +148,10 @@ fn set_material(surface: &mut Surface, entry: Entry<'_>) -> Result<()> {
                 .or("attenuation_distance", glass.attenuation_distance, |entry| entry.number(&POSITIVE_OR_INFINITE))?;
             glass.thin_walled = table.or("thin_walled", glass.thin_walled, |entry| entry.boolean())?;
             glass.priority = table.or("priority", glass.priority, |entry| entry.integer())?;
+            table
         }
         Surface::Opaque(opaque) => {
-            let table = entry.table("material.NAME", &OPAQUE_KEYS)?;
+            let table = entry.table("material.NAME", &[&OPAQUE_KEYS[..], &["normal_scale"]].concat())?;
             if let Some(entry) = table.get("base_color") {
                 (opaque.base_color, opaque.base_color_texture) = (entry.triple(&UNIT)?, None);
             }
@@ -148,7 +159,13 @@ fn set_material(surface: &mut Surface, entry: Entry<'_>) -> Result<()> {
             opaque.roughness = table.or("roughness", opaque.roughness, |entry| entry.number(&UNIT))?;
             opaque.specular = table.or("specular", opaque.specular, |entry| entry.number(&UNIT))?;
             opaque.emission = table.or("emission", opaque.emission, |entry| entry.triple(&LIGHT))?;
+            table
         }
+    };
+    match (table.get("normal_scale"), &mut material.normal_map) {
+        (None, _) => {}
+        (Some(entry), Some(normal)) => normal.scale = entry.number(&STRENGTH)?,
+        (Some(entry), None) => return Err(entry.error(NO_NORMALS)),
     }
     Ok(())
 }
@@ -237,7 +254,7 @@ fn degrees(radians: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Glass, Overrides};
+    use crate::scene::{Glass, NormalMap, Overrides, TextureMap};
 
     fn built_in() -> Scene {
         Scene::load(None, &Overrides::default()).expect("the built-in scene")
@@ -294,6 +311,22 @@ mod tests {
             assert!(now.settings_since(&again).is_empty(), "{settings:?}");
         }
         assert!(before.settings_since(&before).is_empty());
+    }
+
+    #[test]
+    fn what_lies_on_glass_is_set() {
+        let mut scene = built_in();
+        let name = scene.materials[0].name.clone();
+        let settings = ["base_color=[1,0.5,0.25]", "transmission=0.5"];
+        scene.set(&settings.map(|setting| format!("material.{name}.{setting}"))).expect("settings");
+        let coating = glass(&mut scene, 0).coating.as_deref().cloned().expect("a coating");
+        assert_eq!((coating.base_color, coating.transmission), (DVec3::new(1.0, 0.5, 0.25), 0.5));
+        let strength = [format!("material.{name}.normal_scale=0.25")];
+        let error = scene.set(&strength).expect_err("no image").to_string();
+        assert!(error.contains("normal_scale needs a normal_texture"), "{error}");
+        scene.materials[0].normal_map = Some(NormalMap { map: TextureMap::of(0), scale: 1.0 });
+        scene.set(&strength).expect("a setting");
+        assert_eq!(scene.materials[0].normal_map.map(|normal| normal.scale), Some(0.25));
     }
 
     #[test]

@@ -85,6 +85,8 @@ pub const INDEX: Rule =
     Rule { wanted: "a number above 0, from 1e-6 to 1e6, or the name of a glass", holds: |x| (1e-6..=1e6).contains(&x) };
 /// From 0 to 1.
 pub const UNIT: Rule = Rule { wanted: "a number from 0 to 1", holds: |x| (0.0..=1.0).contains(&x) };
+/// What is wrong with a strength of nothing.
+pub const NO_NORMALS: &str = "normal_scale needs a normal_texture, whose strength it is";
 /// Factors of slopes.
 pub const STRENGTH: Rule = Rule { wanted: "a number from -1000 to 1000", holds: |x| x.abs() <= 1e3 };
 /// Radiance, intensity and their factors.

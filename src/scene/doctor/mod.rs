@@ -93,6 +93,7 @@ impl Scene {
     /// Examines every object: bodies of glass for all that is known, panes and opaque objects for what matters there.
     pub fn diagnose(&self) -> Vec<Diagnosis> {
         let mut meshes: Vec<Option<MeshFindings>> = self.meshes.iter().map(|_| None).collect();
+        let mut thick: Vec<Option<bool>> = vec![None; self.meshes.len()];
         let examine = |(number, object): (usize, &Object)| {
             let mesh = &self.meshes[object.mesh];
             let body = self.body(object);
@@ -112,9 +113,17 @@ impl Scene {
             };
             diagnosis.findings.iter_mut().for_each(|finding| *finding = in_world(*finding));
             if let Some(glass) = body {
-                let thin = thin::walls(mesh, &object.transform, self.camera.position, &of_mesh.folded);
-                diagnosis.findings.extend(thin.finding);
-                diagnosis.unfinished.extend((!thin.is_complete).then_some(Ailment::ThinWalls));
+                let camera = self.camera.position;
+                let all_thick = *thick[object.mesh].get_or_insert_with(|| {
+                    let shown = self.objects.iter().filter(|other| other.mesh == object.mesh);
+                    let places: Vec<_> = shown.map(|other| other.transform).collect();
+                    places.len() > 1 && thin::are_thick(mesh, &places, camera, &of_mesh.folded)
+                });
+                if !all_thick {
+                    let thin = thin::walls(mesh, &object.transform, camera, &of_mesh.folded);
+                    diagnosis.findings.extend(thin.finding);
+                    diagnosis.unfinished.extend((!thin.is_complete).then_some(Ailment::ThinWalls));
+                }
                 diagnosis.findings.extend(self.scale(object, glass));
             }
             diagnosis

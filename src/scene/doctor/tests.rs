@@ -173,6 +173,13 @@ fn walls_that_rays_step_over_are_thin() {
     let mut far = alone(sheet(1e-4));
     far.camera.position.z = 1e4;
     assert_eq!(only(&far).ailment, Ailment::ThinWalls);
+    // Of several places of one mesh each is looked at, unless none of them can be thin.
+    let mut both = alone(sheet(1e-4));
+    both.objects.push(both.objects[0].clone());
+    is_well(&both);
+    both.objects[1].transform = DAffine3::from_translation(DVec3::Z * -1e4);
+    let found: Vec<_> = both.diagnose().iter().map(|found| found.findings.len()).collect();
+    assert_eq!(found, [0, 1]);
     // A gap is no wall, whatever mirrors it.
     for mirror in [1.0, -1.0] {
         let gap = sheet(1.0).and(sheet(1.0).moved([0.0, 0.0, 1.000_004]));

@@ -5,6 +5,8 @@
 //! that it may start behind a wall that is nearer. That error grows with the coordinates in the mesh's space and with
 //! the distance from the camera, which is where the renderer has its origin.
 
+use std::ops::Range;
+
 use glam::{DAffine3, DMat3, DVec3};
 
 use super::super::Mesh;
@@ -32,8 +34,36 @@ const MOST_TESTS: usize = 100_000_000;
 /// Triangles of `mesh`, put in its place by `transform` and seen from `camera`, whose opposite wall is too near; those
 /// that are `folded` into others have another fault.
 pub fn walls(mesh: &Mesh, transform: &DAffine3, camera: DVec3, folded: &[bool]) -> Examined {
-    let walls = Walls::new(mesh, transform);
     let rounding = Rounding::new(transform, camera);
+    let range = |corners: &[DVec3; 3], outward| rounding.of_vertices(corners)..FEW * rounding.step(corners, outward);
+    thinner(mesh, transform, folded, range)
+}
+
+/// Whether no wall of `mesh` is thin in any of these places, for certain: then there is no need to look at each.
+pub fn are_thick(mesh: &Mesh, transforms: &[DAffine3], camera: DVec3, folded: &[bool]) -> bool {
+    // Where lengths change alike in all directions so do walls, and angles stay.
+    let widest = |transform: &DAffine3| {
+        let scale = transform.matrix3.determinant().abs().cbrt();
+        let square = transform.matrix3.transpose() * transform.matrix3;
+        let is_uniform =
+            (square * (1.0 / (scale * scale)) - DMat3::IDENTITY).to_cols_array().iter().all(|x| x.abs() < 1e-6);
+        is_uniform.then(|| FEW * Rounding::new(transform, camera).widest_step(&mesh.bounds()) / scale)
+    };
+    let widest = transforms.iter().map(widest).try_fold(0.0, |all: f64, one| one.map(|one| all.max(one)));
+    widest.is_some_and(|reach| {
+        let examined = thinner(mesh, &DAffine3::IDENTITY, folded, |_, _| 0.0..1.01 * reach);
+        examined.is_complete && examined.finding.is_none()
+    })
+}
+
+/// Triangles whose opposite wall is in the `range` of distances for a triangle of the mesh and its outward normal.
+fn thinner(
+    mesh: &Mesh,
+    transform: &DAffine3,
+    folded: &[bool],
+    range: impl Fn(&[DVec3; 3], DVec3) -> Range<f64> + Sync,
+) -> Examined {
+    let walls = Walls::new(mesh, transform);
     let mirrored = if transform.matrix3.determinant() < 0.0 { -1.0 } else { 1.0 };
     let is_folded = |number: usize| folded.get(number) == Some(&true);
     let parts = parts(mesh.triangles.len());
@@ -45,8 +75,7 @@ pub fn walls(mesh: &Mesh, transform: &DAffine3, camera: DVec3, folded: &[bool]) 
             let (outward, center) = (mirrored * normal(corners), middle(corners));
             let local =
                 mesh.triangles[number].map(|vertex| DVec3::from_array(mesh.positions[vertex as usize].map(f64::from)));
-            let reach = FEW * rounding.step(&local, outward);
-            let touching = rounding.of_vertices(&local);
+            let Range { start: touching, end: reach } = range(&local, outward);
             let mut thinnest = f64::INFINITY;
             walls.near(Bounds { min: center - reach, max: center + reach }, 0.0, |other| {
                 left = left.saturating_sub(1);
@@ -97,6 +126,22 @@ impl Rounding {
     /// How far off the corners of a triangle may be because they are 32-bit numbers.
     fn of_vertices(&self, corners: &[DVec3; 3]) -> f64 {
         (self.stretch * middle(&corners.map(DVec3::abs))).max_element() * f64::from(f32::EPSILON)
+    }
+
+    /// No less than any [`Rounding::step`] of a triangle within these bounds of the mesh's space.
+    fn widest_step(&self, bounds: &Bounds) -> f64 {
+        let corners = (0..8).map(|corner| {
+            let pick = |axis: usize| if corner >> axis & 1 == 0 { bounds.min[axis] } else { bounds.max[axis] };
+            DVec3::new(pick(0), pick(1), pick(2))
+        });
+        let (local, position) = corners.fold((DVec3::ZERO, DVec3::ZERO), |(local, position), corner| {
+            (local.max(corner.abs()), position.max(self.to_world.transform_point3(corner).abs()))
+        });
+        let back = GAMMA_5 * (self.shrink * position + self.back);
+        let error = self.stretch * (GAMMA_7 * local + back)
+            + GAMMA_5 * (self.stretch * local + self.to_world.translation.abs());
+        // Of all normals that add up the most of the error, as if they were as long as that.
+        offset_distance(error, DVec3::ONE)
     }
 
     /// How far beyond the middle of a triangle of the mesh's space rays start that leave it.
