@@ -6,6 +6,7 @@ mod common;
 #[path = "tree/shapes.rs"]
 mod shapes;
 
+use std::f64::consts::PI;
 use std::fmt::Write;
 use std::fs;
 use std::path::Path;
@@ -631,4 +632,33 @@ fn models_are_objects_of_scenes() {
     assert_eq!(own.materials[own.objects[0].material].name, "coat");
     let other = scene("material = \"own\"\n");
     assert_eq!(other.materials[other.objects[0].material].name, "own");
+}
+
+/// A sun lights a white board by its irradiance and the cosine, everywhere the same.
+#[test]
+fn directional_lights_shine_everywhere_alike() {
+    let Some(validated) = Validated::open() else { return };
+    let white = json!({ "pbrMetallicRoughness": { "metallicFactor": 0.0 }, "extensions": {
+        "KHR_materials_specular": { "specularFactor": 0.0 } } });
+    let mut model = Model::of(&rectangle(4.0, 4.0), Some(white));
+    model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
+        { "type": "directional", "intensity": 3.0, "color": [1.0, 0.5, 0.25] }] } });
+    // Sixty degrees off.
+    let (sine, cosine) = 30.0_f64.to_radians().sin_cos();
+    model.node(json!({ "rotation": [sine, 0, 0, cosine], "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    let mut scene = loaded(&model);
+    assert_eq!((scene.warnings.len(), scene.lights.len()), (0, 1), "{:?}", scene.warnings);
+    scene.environment.light = Surroundings::Color(DVec3::ZERO);
+    scene.framed = false;
+    scene.camera.position = DVec3::new(0.0, 0.0, 2.0);
+    scene.camera.target = DVec3::ZERO;
+    scene.camera.vertical_fov = 0.5;
+    let wanted = DVec3::new(3.0, 1.5, 0.75) * 0.5 / PI;
+    for transport in [Transport::Path, Transport::Tree] {
+        for pixel in &picture(&validated, &scene, transport, 4).radiance {
+            let found = DVec3::from_array(pixel.map(f64::from));
+            assert!(((found - wanted) / wanted).abs().max_element() < 2e-3, "{found}, not {wanted}");
+        }
+    }
+    validated.verdict();
 }

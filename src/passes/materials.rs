@@ -74,12 +74,15 @@ fn indices(scene: &Scene, plan: &Plan) -> Vec<f64> {
 /// Materials, and the tables of what rough ones lose.
 pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View, maps: &Maps) -> (Vec<MaterialRecord>, Vec<f32>) {
     let means = Means { scene, looks: plan.effects.contains(Effect::Textures) };
+    // Of what nobody sees means are not worth their time: images are large.
+    let of_opaque = Means { scene, looks: means.looks || !plan.effects.contains(Effect::Opaque) };
+    let of_coatings = Means { scene, looks: means.looks || !plan.effects.contains(Effect::Coatings) };
     let mut albedos = Albedos { values: vec![0.0], tables: Vec::new() };
     let others = indices(scene, plan);
     let record = |material: &Material| {
         let glass = match &material.surface {
             Surface::Dielectric(glass) => glass,
-            Surface::Opaque(opaque) => return opaque_record(scene, opaque, &means, maps, common(material, maps)),
+            Surface::Opaque(opaque) => return opaque_record(plan, opaque, &of_opaque, maps, common(material, maps)),
         };
         let finish = means.of(glass.metallic_roughness_texture.as_ref());
         let (ior, roughness) = (glass.ior, glass.roughness * finish.y);
@@ -112,10 +115,10 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View, maps: &Maps) ->
         MaterialRecord {
             absorption: Vec3::new(r, g, b),
             refraction_index: ior as f32,
-            base_color: (coating.base_color * means.of(coating.base_color_texture.as_ref()).truncate()).as_vec3(),
+            base_color: (coating.base_color * of_coatings.of(coating.base_color_texture.as_ref()).truncate()).as_vec3(),
             roughness: roughness as f32,
             metallic: (coating.metallic * finish.z) as f32,
-            transmission: (coating.transmission * means.of(coating.transmission_texture.as_ref()).x) as f32,
+            transmission: (coating.transmission * of_coatings.of(coating.transmission_texture.as_ref()).x) as f32,
             specular: 1.0,
             head: head(ior),
             color_map: maps.number(coating.base_color_texture.as_ref()),
@@ -221,13 +224,7 @@ fn common(material: &Material, maps: &Maps) -> MaterialRecord {
     }
 }
 
-fn opaque_record(
-    scene: &Scene,
-    opaque: &Opaque,
-    means: &Means<'_>,
-    maps: &Maps,
-    base: MaterialRecord,
-) -> MaterialRecord {
+fn opaque_record(plan: &Plan, opaque: &Opaque, means: &Means<'_>, maps: &Maps, base: MaterialRecord) -> MaterialRecord {
     let finish = means.of(opaque.metallic_roughness_texture.as_ref());
     let base_color = opaque.base_color * means.of(opaque.base_color_texture.as_ref()).truncate();
     let emission = opaque.emission * means.of(opaque.emission_texture.as_ref()).truncate();
@@ -238,7 +235,8 @@ fn opaque_record(
         metallic: (opaque.metallic * finish.z) as f32,
         specular: opaque.specular as f32,
         head: head(opaque.ior),
-        shines: luminance(mean_emission(scene, opaque)) as f32,
+        // Others look for no lights by how bright they are.
+        shines: if plan.model == Model::Path { luminance(mean_emission(means.scene, opaque)) as f32 } else { 0.0 },
         kind: MaterialRecord::OPAQUE,
         color_map: maps.number(opaque.base_color_texture.as_ref()),
         finish_map: maps.number(opaque.metallic_roughness_texture.as_ref()),

@@ -183,17 +183,19 @@ impl Reader<'_> {
             Some(_) => entry.number(&STRENGTH),
             None => Err(entry.error(NO_NORMALS)),
         })?;
-        let cutout = match (table.get("alpha_cutoff"), base_color_texture) {
+        let cutoff =
+            table.get("alpha_cutoff").map(|entry| entry.number(&UNIT).map(|cutoff| (entry, cutoff))).transpose()?;
+        let cutout = match (cutoff, base_color_texture) {
             (None, _) => None,
-            (Some(entry), None) => {
+            (Some((entry, _)), None) => {
                 return Err(entry.error("alpha_cutoff needs a base_color_texture, whose alpha it is about"));
             }
-            (Some(_), Some(map)) if !assembly.textures.all[map.texture].has_alpha() => {
+            (Some((entry, _)), Some(map)) if !assembly.textures.all[map.texture].has_alpha() => {
                 let image = assembly.textures.all[map.texture].name();
                 assembly.warnings.push(format!("material {:?}: {image} has no alpha; nothing is cut out", entry.key));
                 None
             }
-            (Some(entry), map) => Some(Cutout { alpha: 1.0, map, cutoff: Some(entry.number(&UNIT)?) }),
+            (Some((_, cutoff)), map) => Some(Cutout { alpha: 1.0, map, cutoff: Some(cutoff) }),
         };
         let normal_map = normal.map(|map| NormalMap { map, scale });
         Ok(Material { name: entry.key.to_owned(), surface, normal_map, cutout })

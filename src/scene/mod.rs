@@ -381,8 +381,10 @@ fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
         false => (Wear::ClearGlass, Some(0)),
     };
     let place = Placement { number, transform: DAffine3::IDENTITY, smooth: true };
-    let MeshFile { camera, lights, scene_warnings, .. } = assembly.add(Files::Disk, path, wear, &place)?;
-    let (camera, lights, mut warnings) = (*camera, std::mem::take(lights), std::mem::take(scene_warnings));
+    let MeshFile { camera, lights, suns, scene_warnings, .. } = assembly.add(Files::Disk, path, wear, &place)?;
+    let (camera, mut lights, mut warnings) = (*camera, std::mem::take(lights), std::mem::take(scene_warnings));
+    let suns = std::mem::take(suns);
+    lights.extend(suns.iter().map(|sun| sun.over(assembly.bounds())));
     // A file's camera looks along a direction: what it turns around lies as far off as the middle of the scene.
     let camera = camera.map(|camera| camera.aimed_at(assembly.bounds().center()));
     assembly.warnings.append(&mut warnings);

@@ -22,7 +22,7 @@ use gltf::{Document, Node, json};
 
 use super::files::Files;
 use super::mesh::{FARTHEST, Preparation};
-use super::mesh_file::{MeshFile, Part, shorten, worn};
+use super::mesh_file::{MeshFile, Part, Sun, shorten, worn};
 use super::table::SCALE;
 use super::{Camera, Material, PointLight};
 use crate::{Error, Result};
@@ -123,7 +123,7 @@ pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<MeshF
         let what = if lost == 1 { "triangle" } else { "triangles" };
         remarks.say(format!("{lost} degenerate {what} removed, and the parts that held nothing else"));
     }
-    let SceneParts { mut parts, camera, lights, remarks: of_scene, flat, .. } = scene;
+    let SceneParts { mut parts, camera, lights, suns, remarks: of_scene, flat, .. } = scene;
     if flat > 0 {
         let what = if flat == 1 { "node is" } else { "nodes are" };
         remarks.say(format!("{flat} {what} scaled by less than 1e-9 or more than 1e9; left out"));
@@ -136,6 +136,7 @@ pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<MeshF
         images,
         camera,
         lights,
+        suns,
         files: resources.read,
         warnings: remarks.into_lines(&file),
         material_warnings: of_materials.into_lines(&file),
@@ -216,6 +217,7 @@ struct SceneParts {
     parts: Vec<Part>,
     camera: Option<Camera>,
     lights: Vec<PointLight>,
+    suns: Vec<Sun>,
     remarks: Remarks,
     /// Nodes that are scaled to nothing.
     flat: usize,
@@ -298,7 +300,20 @@ impl SceneParts {
                 }
                 self.lights.push(PointLight { position: transform.translation, intensity: color });
             }
-            Kind::Directional => self.remarks.leave_out("directional lights"),
+            Kind::Directional => {
+                let intensity = light.intensity();
+                let irradiance = DVec3::from_array(light.color().map(f64::from)) * f64::from(intensity);
+                let direction = transform.transform_vector3(DVec3::NEG_Z).try_normalize();
+                let is_light =
+                    irradiance.is_finite() && irradiance.min_element() >= 0.0 && irradiance.max_element() <= 1e9;
+                match direction.filter(|_| is_light) {
+                    Some(direction) => self.suns.push(Sun { direction, irradiance }),
+                    None => self.remarks.say(format!(
+                        "light {}: intensity {intensity} is not from 0 to 1e9, or it has no direction; left out",
+                        light.index()
+                    )),
+                }
+            }
             Kind::Spot { .. } => self.remarks.leave_out("spot lights"),
         }
     }
