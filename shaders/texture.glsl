@@ -202,8 +202,8 @@ vec3 BumpedNormal(vec3 bump, vec3 normal, Found found, vec3 weights)
     mat3x2 corners = CoordinatesOf(vertices);
     vec2 right = corners[1] - corners[0];
     vec2 up = corners[2] - corners[0];
-    bool isMirrored = (right.x * up.y < right.y * up.x) != (determinant(mat3(instances[found.instance].objectToWorld)) < 0.0);
     mat3 toWorld = mat3(instances[found.instance].objectToWorld);
+    bool isMirrored = (right.x * up.y < right.y * up.x) != (determinant(toWorld) < 0.0);
     vec3 tangent = toWorld * mean;
     tangent -= dot(tangent, normal) * normal;
     float size = length(tangent);

@@ -194,11 +194,14 @@ impl<'a> Converter<'a> {
             Some(0.0) => ENDLESS,
             Some(ior) => self.within(name, "ior", ior, 1.0, ENDLESS),
         };
-        let is_dark = emission_texture.is_some();
-        let emission_texture = emission_texture.and_then(|info| self.map(&info, Encoding::Color, name));
-        // Where an image does not say what shines nothing does.
-        let is_dark = is_dark && emission_texture.is_none();
-        let emission = if is_dark { [0.0; 3] } else { emission };
+        let (emission, emission_texture) = match emission_texture {
+            None => (emission, None),
+            // Where an image does not say what shines nothing does.
+            Some(info) => match self.map(&info, Encoding::Color, name) {
+                None => ([0.0; 3], None),
+                map => (emission, map),
+            },
+        };
         Opaque {
             base_color,
             base_color_texture: common.color_map,
