@@ -108,7 +108,13 @@ impl Bench {
         let args = RenderArgs { size: Some(size), tolerance: Some(tolerance), ..RenderArgs::default() };
         let choice = choose(&self.gpu, scene, &args)?;
         let best = choice.best;
+        eprintln!("chosen: {}, {} samples", best.model.name(), best.samples);
         let found = self.picture(scene, &best.args)?;
+        eprintln!(
+            "rendered: {} samples, {:.0} s on the device",
+            found.samples,
+            1e-3 * found.gpu_ms().unwrap_or(f64::NAN)
+        );
         let label = format!("{}, {}", best.model.name(), found.samples);
         if best.model == Model::Tree {
             let deep = RenderArgs {
@@ -168,6 +174,7 @@ fn main() -> Result<()> {
             scene.frame(4.0 / 3.0);
             let tree = bench.tree(&scene, tolerance, Size { width: 64, height: 48 })?;
             let tree = tree.map_or("".into(), |share| format!("{:.2} %", 100.0 * share));
+            eprintln!("{name}, {tolerance}: tree {tree}");
             let (auto, chosen) = bench.auto(&scene, tolerance, size)?;
             // At the finest one `path` would take days of scenes that it is not chosen for, and hours once more of those that it is.
             let is_fine = tolerance < FINE;

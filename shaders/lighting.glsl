@@ -3,6 +3,7 @@
 #define LIGHTING_GLSL
 
 #include "bsdf.glsl"
+#include "spot.glsl"
 
 // Light scattered from the environment.
 vec3 ComputeBSDFLight(SurfaceData data, vec3 viewDir)
@@ -31,7 +32,7 @@ vec3 ComputeBSDFDirect(SurfaceData data, vec3 viewDir, vec3 position, Light ligh
     float distanceSquared = dot(toLight, toLight);
     if (distanceSquared == 0.0) return vec3(0.0);
     vec3 lightDir = toLight * inversesqrt(distanceSquared);
-    vec3 irradiance = light.intensity / distanceSquared;
+    vec3 irradiance = IntensityAlong(-lightDir, light) / distanceSquared;
     if (IsRough(data)) return ComputeRoughDirect(data, viewDir, lightDir) * irradiance;
     return ComputeDirect(ComputeSpecularReflectionDirect(data, viewDir, lightDir), data, viewDir) * irradiance;
 }

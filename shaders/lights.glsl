@@ -13,6 +13,7 @@
 #include "pixel.glsl"
 #include "records.glsl"
 #include "skylight.glsl"
+#include "spot.glsl"
 #include "texture.glsl"
 
 layout(local_size_x = 8, local_size_y = 8) in;
@@ -111,11 +112,12 @@ bool AskFor(uint number, Record record, Lit lit, out LightRay ray)
     if (number < frame.lightCount) {
         vec3 toLight = lights[number].position - lit.arrival.position;
         ray.reach = max(length(toLight), 1e-30);
-        wo = toLight / ray.reach * lit.toWorld;
+        vec3 direction = toLight / ray.reach;
+        wo = direction * lit.toWorld;
         // Light is given as it is in the medium that the surface lies in.
         bool disperses = false;
         float spread = ray.reach * IndexOf(record.medium, D_LINE, disperses);
-        light = DIRECT_LIGHT ? lights[number].intensity / (spread * spread) : vec3(0.0);
+        light = DIRECT_LIGHT ? IntensityAlong(-direction, lights[number]) / (spread * spread) : vec3(0.0);
     } else {
         Towards towards = AskSky(number - frame.lightCount, lit);
         wo = towards.wo;

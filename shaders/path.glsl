@@ -16,6 +16,7 @@
 #include "skylight.glsl"
 #include "sobol.glsl"
 #include "spectrum.glsl"
+#include "spot.glsl"
 #include "texture.glsl"
 #include "welford.glsl"
 
@@ -127,7 +128,7 @@ bool AskLight(Met met, mat3 toWorld, Arrival arrival, Sequence sequence, uint pa
         vec3 toLight = lights[number].position - arrival.position;
         light.reach = max(length(toLight), 1e-30);
         light.direction = toLight / light.reach;
-        radiance = lights[number].intensity * (float(frame.lightCount) / (light.reach * light.reach * chance));
+        radiance = IntensityAlong(-light.direction, lights[number]) * (float(frame.lightCount) / (light.reach * light.reach * chance));
     } else if (SeeksEmitters() && (INTERIOR || met.isOpaque)) { // else the surface would not find them either
         EmitterSample chosen = SampleEmitter(choice.y, u);
         vec3 toLight = chosen.position - arrival.position;

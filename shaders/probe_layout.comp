@@ -82,7 +82,10 @@ void main()
     Put(materials[1].head);
     Put(materials[1].transmission);
     Put(lights[1].position);
+    Put(lights[1].coneScale);
     Put(lights[1].intensity);
+    Put(lights[1].coneOffset);
+    Put(lights[1].axis);
     Put(positions[1]);
     Put(normals[1]);
     Put(triangles[1]);

@@ -80,7 +80,10 @@ struct Material {
 
 struct Light {
     vec3 position;
-    vec3 intensity;            // W/sr
+    float coneScale;           // of a spot, whose strength is a cosine times this plus the next, squared; 0: shines everywhere
+    vec3 intensity;            // W/sr, of a spot along its axis
+    float coneOffset;
+    vec3 axis;                 // of a spot, the direction of its light
 };
 
 layout(std430, set = 0, binding = 0) readonly buffer FrameBuffer { Frame frame; };

@@ -607,7 +607,7 @@ mod tests {
         check(&scene, Effect::Reflection, &[glass]);
         check(&scene, Effect::Nesting, &[Caller::Pair(0, 2)]);
         // Shines, does not shine.
-        scene.lights = [1.0, 0.0].map(|x| PointLight { position: DVec3::Y, intensity: DVec3::splat(x) }).into();
+        scene.lights = [1.0, 0.0].map(|x| PointLight::new(DVec3::Y, DVec3::splat(x))).into();
         check(&scene, Effect::DirectLight, &[Caller::Light(0)]);
         check(&scene, Effect::Shadows, &[Caller::Light(0)]);
         scene.objects.remove(2);

@@ -266,7 +266,7 @@ mod tests {
         };
         let mut scene = Scene::load(None, &Overrides::default()).expect("the built-in scene");
         assert!(unseen(&scene, Model::Path).is_empty(), "no light");
-        scene.lights.push(PointLight { position: DVec3::Y, intensity: DVec3::ONE });
+        scene.lights.push(PointLight::new(DVec3::Y, DVec3::ONE));
         assert_eq!(unseen(&scene, Model::Path), [POINT_THROUGH_GLASS]);
         assert!(unseen(&scene, Model::Tree).is_empty(), "of another model nothing is said");
         scene.lights[0].intensity = DVec3::ZERO;

@@ -412,7 +412,7 @@ fn point_lights_shine_off_the_front() {
     for roughness in [0.01, 0.4] {
         let mut scene = scene(BALL, &Overrides { roughness: Some(roughness), ..Overrides::default() });
         scene.environment.light = Surroundings::Color(DVec3::ZERO);
-        scene.lights = vec![PointLight { position: DVec3::new(2.0, 3.0, 3.0), intensity: DVec3::splat(30.0) }];
+        scene.lights = vec![PointLight::new(DVec3::new(2.0, 3.0, 3.0), DVec3::splat(30.0))];
         let Some((plan, found)) = picture(&scene, double(128, 96)) else { return };
         assert_eq!(plan.unsupported.names(), ["shadows"]);
         let Some((_, single)) = picture(&scene, with(Model::Single, 128, 96)) else { return };

@@ -124,6 +124,9 @@ fn the_same_scene_makes_the_same_picture() {
         format!(
             "[camera]\nposition = [0, 0.25, 5]\ntarget = [0, 0.25, 4]\nvertical_fov = {fov}\n\n\
             [[light]]\nkind = \"point\"\nposition = [1, 3, 2]\nintensity = [8, 6, 4]\n\n\
+            [[light]]\nkind = \"spot\"\nposition = [-1, 0.5, 3]\nintensity = [20, 20, 20]\n\
+            direction = [0, 0, -1]\nouter_cone_angle = {fov}\n\n\
+            [[light]]\nkind = \"directional\"\ndirection = [0, 0, -1]\nirradiance = [0.5, 0.25, 0.125]\n\n\
             [material.tea]\nkind = \"dielectric\"\nior = 1.4\nroughness = 0.25\ndispersion = 0.5\n\
             attenuation_color = [0.9, 0.5, 0.25]\nattenuation_distance = 0.75\n\n\
             [material.floor]\nkind = \"opaque\"\nbase_color_texture = \"checker.png\"\nroughness = 0.5\n\n\
@@ -157,7 +160,9 @@ fn the_same_scene_makes_the_same_picture() {
     });
     model.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.6_f32, "znear": 0.1 } }));
     model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [
-        { "type": "point", "intensity": 8.0, "color": [1.0, 0.75, 0.5] }] } });
+        { "type": "point", "intensity": 8.0, "color": [1.0, 0.75, 0.5] },
+        { "type": "spot", "intensity": 20.0, "spot": { "innerConeAngle": 0.0, "outerConeAngle": 0.6_f32 } },
+        { "type": "directional", "intensity": 0.5, "color": [1.0, 0.5, 0.25] }] } });
     model.node(json!({ "mesh": shown[0], "translation": [-1, 0.25, 0] }));
     // Nodes within nodes, and a matrix.
     let inner = model.push(
@@ -170,6 +175,9 @@ fn the_same_scene_makes_the_same_picture() {
     model.node(json!({ "mesh": shown[2], "translation": [0, -0.5, 1] }));
     model.node(json!({ "camera": 0, "translation": [0, 0.25, 5] }));
     model.node(json!({ "translation": [1, 3, 2], "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    // Along -z, without a rotation that 32 bits would round.
+    model.node(json!({ "translation": [-1, 0.5, 3], "extensions": { "KHR_lights_punctual": { "light": 1 } } }));
+    model.node(json!({ "extensions": { "KHR_lights_punctual": { "light": 2 } } }));
 
     let wanted = load(&folder.join("scene.toml"));
     fs::write(folder.join("embedded.gltf"), model.embedded()).expect("a model");
@@ -544,12 +552,14 @@ fn what_is_not_supported_is_named_once() {
     );
     model.push("textures", json!({}));
     model.json["extensionsUsed"] = json!(["KHR_materials_clearcoat", "KHR_materials_ior"]);
-    model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "spot", "spot": {} }] } });
+    model.json["extensions"] =
+        json!({ "KHR_lights_punctual": { "lights": [{ "type": "spot", "spot": {}, "range": 4.0 }] } });
     for _ in 0..2 {
         model.node(json!({ "mesh": 0, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
     }
     let warnings = loaded(&model).warnings.join("\n");
-    for wanted in ["left out: KHR_materials_clearcoat\n", "left out: occlusion textures", "left out: spot lights"] {
+    for wanted in ["left out: KHR_materials_clearcoat\n", "left out: occlusion textures", "left out: ranges of lights"]
+    {
         assert_eq!(format!("{warnings}\n").matches(wanted).count(), 1, "{wanted}: {warnings}");
     }
 }

@@ -148,7 +148,7 @@ fn uniform_images_are_numbers() {
                     board(Surface::Opaque(Opaque::default())).placed(DAffine3::from_translation(-DVec3::Z)),
                 ]);
                 scene.environment.light = directions();
-                scene.lights = vec![PointLight { position: DVec3::new(1.0, 2.0, 3.0), intensity: DVec3::splat(4.0) }];
+                scene.lights = vec![PointLight::new(DVec3::new(1.0, 2.0, 3.0), DVec3::splat(4.0))];
                 scene.textures.push(image(1, &[value]).into());
                 scene
             };
@@ -316,7 +316,7 @@ fn cut_out_surfaces_are_not_there() {
     let wall = || board(matte()).placed(DAffine3::from_translation(DVec3::Z * -2.0));
     let lit = |mut scene: Scene| {
         scene.environment.light = directions();
-        scene.lights = vec![PointLight { position: DVec3::new(0.5, 1.0, 2.5), intensity: DVec3::splat(9.0) }];
+        scene.lights = vec![PointLight::new(DVec3::new(0.5, 1.0, 2.5), DVec3::splat(9.0))];
         scene.textures.push(image(2, &[[255, 255, 255, 0], [255, 255, 255, 255]]).into());
         scene
     };

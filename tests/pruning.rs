@@ -216,7 +216,10 @@ impl Random {
             for _ in 0..self.0.u32(1..3) {
                 let is_off = !made.lights.is_empty() && self.0.bool();
                 let intensity = if is_off { DVec3::ZERO } else { 10.0 * self.color() };
-                made.lights.push(PointLight { position: self.point(3.0), intensity });
+                let cone =
+                    self.0.bool().then(|| Cone::new(self.point(1.0), self.number(0.0, 0.5), self.number(0.6, 1.5)));
+                let light = PointLight::new(self.point(3.0), intensity);
+                made.lights.push(PointLight { cone: cone.flatten(), ..light });
             }
         }
         made

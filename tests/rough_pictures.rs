@@ -207,8 +207,7 @@ fn a_rough_ball_agrees_with_visible_normals_in_64_bits() {
 fn point_lights_shine_through_rough_glass_and_off_it() {
     let mut scene = ball(0.5, 1.5);
     scene.environment.light = Surroundings::Color(DVec3::ZERO);
-    let light =
-        |x: f64, y: f64, z: f64| PointLight { position: DVec3::new(x, y, z), intensity: DVec3::new(9.0, 5.0, 2.0) };
+    let light = |x: f64, y: f64, z: f64| PointLight::new(DVec3::new(x, y, z), DVec3::new(9.0, 5.0, 2.0));
     for (name, light) in [("off", light(2.0, 2.0, 3.0)), ("through", light(0.5, 0.5, -3.0))] {
         scene.lights = vec![light];
         let Some((plan, rendered)) = picture(&scene, effects("auto,-energy-compensation")) else { return };
@@ -242,7 +241,7 @@ fn nothing_breaks_at_the_ends_of_the_ranges() {
     for ior in [1e-6, 0.4132, 1.0 - 1e-7, 1.0 + 1e-6, 1.0003, 2.42, 1e6] {
         for roughness in [0.0101, 0.5, 1.0] {
             let mut scene = ball(roughness, ior);
-            scene.lights = vec![PointLight { position: DVec3::new(0.0, 2.0, -3.0), intensity: DVec3::splat(10.0) }];
+            scene.lights = vec![PointLight::new(DVec3::new(0.0, 2.0, -3.0), DVec3::splat(10.0))];
             let Some((_, rendered)) = picture(&scene, sized(48, 48)) else { return };
             let good = |value: &f32| value.is_finite() && *value >= 0.0;
             assert!(rendered.radiance.iter().flatten().all(good), "index {ior}, roughness {roughness}");
@@ -262,7 +261,7 @@ fn from_inside_rough_glass_is_a_blurred_mirror() {
     assert!(worst < 1e-5, "{worst}");
     // A light in there shows no more than on the smooth surface: nothing.
     scene.environment.light = Surroundings::Color(DVec3::ZERO);
-    scene.lights = vec![PointLight { position: DVec3::new(0.4, 0.3, 0.0), intensity: DVec3::ONE }];
+    scene.lights = vec![PointLight::new(DVec3::new(0.4, 0.3, 0.0), DVec3::ONE)];
     let Some((_, rendered)) = picture(&scene, sized(64, 64)) else { return };
     assert!(rendered.radiance.iter().flatten().all(|&value| value == 0.0));
 }

@@ -85,7 +85,7 @@ fn a_lit_ball_agrees_with_the_equations() {
     let mut scene = scene(BALL, &Overrides { roughness: Some(0.3), ..Overrides::default() });
     scene.lights =
         [(DVec3::new(2.0, 3.0, 2.5), DVec3::new(40.0, 20.0, 10.0)), (DVec3::new(-3.0, 0.5, 3.0), DVec3::splat(9.0))]
-            .map(|(position, intensity)| PointLight { position, intensity })
+            .map(|(position, intensity)| PointLight::new(position, intensity))
             .into();
     // In the original roughness is that of the highlight alone.
     let effects = Some("auto,-roughness".parse().expect("a selection"));

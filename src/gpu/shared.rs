@@ -135,9 +135,11 @@ impl MaterialRecord {
 #[expect(missing_docs, reason = "shared.glsl describes the members")]
 pub struct LightRecord {
     pub position: Vec3,
-    pub padding: f32,
+    pub cone_scale: f32,
     pub intensity: Vec3,
-    pub padding2: f32,
+    pub cone_offset: f32,
+    pub axis: Vec3,
+    pub padding: f32,
 }
 
 /// `Push`: what changes from draw to draw.

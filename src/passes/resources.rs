@@ -434,6 +434,9 @@ fn lights(scene: &Scene, view: &View) -> Vec<LightRecord> {
         position: ((light.position - view.position) * scale).as_vec3(),
         // Irradiance is intensity over distance squared, and distances are scaled.
         intensity: (light.intensity * scale * scale).as_vec3(),
+        cone_scale: light.cone.map_or(0.0, |cone| cone.falloff().0 as f32),
+        cone_offset: light.cone.map_or(1.0, |cone| cone.falloff().1 as f32),
+        axis: light.cone.map_or(DVec3::ZERO, |cone| cone.axis()).as_vec3(),
         ..LightRecord::default()
     };
     scene.lights.iter().map(record).collect()

@@ -426,7 +426,7 @@ mod tests {
     }
 
     fn lit(lights: usize) -> Scene {
-        Scene { lights: vec![PointLight { position: DVec3::Y, intensity: DVec3::ONE }; lights], ..built_in() }
+        Scene { lights: vec![PointLight::new(DVec3::Y, DVec3::ONE); lights], ..built_in() }
     }
 
     fn explained(scene: &Scene, effects: &str) -> Explanation {

@@ -8,17 +8,18 @@ use glam::{DAffine3, DMat3, DVec3};
 use super::assembly::{Assembly, Placement, Wear};
 use super::camera::DEFAULT_FOV;
 use super::files::Files;
+use super::light::{Cone, LightSource, PointLight, Sun};
 use super::material::Glass;
 use super::mesh_file::{self, Image, ImageSource};
 use super::render_table::options;
 use super::table::{
-    Document, Entry, FIELD, FINITE, INDEX, LENGTH, LIGHT, NO_NORMALS, POSITIVE_OR_INFINITE, SCALE, STRENGTH, Table,
-    UNIT, text,
+    Document, Entry, FIELD, FINITE, HALF_ANGLE, INDEX, LENGTH, LIGHT, NO_NORMALS, POSITIVE_OR_INFINITE, SCALE,
+    STRENGTH, Table, UNIT, text,
 };
 use super::texture::Encoding;
 use super::{
-    Camera, Coating, Cutout, Dielectric, Dispersion, Material, NormalMap, Opaque, Overrides, PointLight, Surface,
-    TextureMap, builtin,
+    Camera, Coating, Cutout, Dielectric, Dispersion, Material, NormalMap, Opaque, Overrides, Surface, TextureMap,
+    builtin,
 };
 use crate::Result;
 use crate::options::RenderArgs;
@@ -72,7 +73,7 @@ pub fn read(files: Files, path: &Path, overrides: &Overrides) -> Result<SceneFil
     let environment = root.or("environment", EnvironmentTable::default(), |entry| reader.environment(entry))?;
     let camera = root.get("camera").map(camera).transpose()?;
     let render = root.or("render", RenderArgs::default(), |entry| options(entry, "render", files, reader.folder))?;
-    let lights = root.or("light", Vec::new(), |entry| entry.tables()?.into_iter().map(light).collect())?;
+    let lights: Vec<_> = root.or("light", Vec::new(), |entry| entry.tables()?.into_iter().map(light).collect())?;
     let own = if overrides.no_render_table { Overrides::default() } else { Overrides::of(&render) };
     let mut assembly = Assembly::new(overrides.preparation(&own));
     if let Some(materials) = root.get("material") {
@@ -93,6 +94,7 @@ pub fn read(files: Files, path: &Path, overrides: &Overrides) -> Result<SceneFil
     for object in &objects {
         object.add_to(files, &mut assembly)?;
     }
+    let lights = lights.iter().map(|light| light.over(assembly.bounds())).collect();
     Ok(SceneFile { environment, camera, lights, render, assembly })
 }
 
@@ -105,12 +107,46 @@ fn camera(entry: Entry<'_>) -> Result<Camera> {
     Camera::new(position, target, up, vertical_fov).map_err(|message| table.error(format!("[camera]: {message}")))
 }
 
-fn light(entry: Entry<'_>) -> Result<PointLight> {
-    let table = entry.table("[light]", &["kind", "position", "intensity"])?;
-    table.require("kind")?.choice(&[("point", ())])?;
-    let position = table.require("position")?.triple(&LENGTH)?;
-    let intensity = table.require("intensity")?.triple(&LIGHT)?;
-    Ok(PointLight { position, intensity })
+/// Lights that a scene file can have.
+#[derive(Clone, Copy, PartialEq)]
+enum LightKind {
+    Point,
+    Spot,
+    Directional,
+}
+
+fn light(entry: Entry<'_>) -> Result<LightSource> {
+    const NAME: &str = "[light]";
+    let kind = entry.any_table(NAME)?.require("kind")?;
+    let kinds = [("point", LightKind::Point), ("spot", LightKind::Spot), ("directional", LightKind::Directional)];
+    let kind = kind.choice(&kinds)?;
+    let own: &[_] = match kind {
+        LightKind::Point => &["position", "intensity"],
+        LightKind::Spot => &["position", "intensity", "direction", "inner_cone_angle", "outer_cone_angle"],
+        LightKind::Directional => &["direction", "irradiance"],
+    };
+    let table = entry.table(NAME, &[&["kind"], own].concat())?;
+    let direction = || {
+        let entry = table.require("direction")?;
+        entry.triple(&FINITE)?.try_normalize().ok_or_else(|| entry.error("direction: has no length"))
+    };
+    if kind == LightKind::Directional {
+        return Ok(LightSource::Sun(Sun {
+            direction: direction()?,
+            irradiance: table.require("irradiance")?.triple(&LIGHT)?,
+        }));
+    }
+    let light =
+        PointLight::new(table.require("position")?.triple(&LENGTH)?, table.require("intensity")?.triple(&LIGHT)?);
+    if kind == LightKind::Point {
+        return Ok(LightSource::Point(light));
+    }
+    let angle = |key, default| table.or(key, default, |entry| entry.number(&HALF_ANGLE));
+    let (inner, outer) = (angle("inner_cone_angle", 0.0)?, angle("outer_cone_angle", 45.0)?);
+    let cone = Cone::new(direction()?, inner.to_radians(), outer.to_radians()).ok_or_else(|| {
+        table.error(format!("[[light]]: inner_cone_angle {inner} is not below outer_cone_angle {outer}"))
+    })?;
+    Ok(LightSource::Point(PointLight { cone: Some(cone), ..light }))
 }
 
 /// Reads what refers to other files.

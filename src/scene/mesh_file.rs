@@ -3,12 +3,13 @@
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 use super::files::Files;
+use super::light::LightSource;
 use super::mesh::Preparation;
 use super::texture::Encoding;
-use super::{Bounds, Camera, Material, Mesh, PointLight, gltf, obj};
+use super::{Camera, Material, Mesh, gltf, obj};
 use crate::Result;
 
 /// What a mesh file holds.
@@ -24,10 +25,8 @@ pub struct MeshFile {
     pub images: Vec<Image>,
     /// The first camera.
     pub camera: Option<Camera>,
-    /// Point lights.
-    pub lights: Vec<PointLight>,
-    /// Lights without a place.
-    pub suns: Vec<Sun>,
+    /// Lights.
+    pub lights: Vec<LightSource>,
     /// Other files that were read.
     pub files: Vec<PathBuf>,
     /// What is wrong with the meshes, one line each.
@@ -36,28 +35,6 @@ pub struct MeshFile {
     pub material_warnings: Vec<String>,
     /// What is wrong with cameras and lights, which matters only where the file is the whole scene.
     pub scene_warnings: Vec<String>,
-}
-
-/// A light that shines from one direction everywhere.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Sun {
-    /// Where its light goes, of unit length.
-    pub direction: DVec3,
-    /// Of a surface that faces it, W/m^2.
-    pub irradiance: DVec3,
-}
-
-impl Sun {
-    /// So many times as far away as what it shines on is large: the light of this point is everywhere the same but for a
-    /// ten thousandth.
-    const FAR: f64 = 1e4;
-
-    /// A point light in its place, for what lies in `bounds`.
-    pub fn over(&self, bounds: Bounds) -> PointLight {
-        let distance = Self::FAR * bounds.extent().length().max(f64::MIN_POSITIVE);
-        let position = bounds.center() - self.direction * distance;
-        PointLight { position, intensity: self.irradiance * distance * distance }
-    }
 }
 
 /// A mesh in its place.

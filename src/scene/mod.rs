@@ -14,6 +14,7 @@ mod environment;
 mod file;
 mod files;
 mod gltf;
+mod light;
 mod maps;
 mod material;
 mod mesh;
@@ -34,13 +35,14 @@ use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-use glam::{DAffine3, DVec3};
+use glam::DAffine3;
 
 pub use bounds::Bounds;
 pub use camera::Camera;
 pub use doctor::{Ailment, Diagnosis, Finding, Mending, Nest, Nesting};
 pub use environment::{Environment, Panorama, Repairs, Surroundings};
 pub(crate) use files::Files;
+pub use light::{Cone, PointLight};
 pub use maps::{Cutout, NormalMap, TextureMap, Wrap};
 pub use material::{Coating, Dielectric, Dispersion, GLASSES, Glass, Material, Opaque, Sellmeier, Surface};
 pub use mesh::{FaultSites, Mesh, MeshFaults, Preparation, RawMesh, Refusal};
@@ -80,15 +82,6 @@ pub struct Scene {
     pub warnings: Vec<String>,
     /// The files that it was read from, as far as they are on disk: it is another where one of them changes.
     pub files: Vec<PathBuf>,
-}
-
-/// A light without extent.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct PointLight {
-    /// Position in metres.
-    pub position: DVec3,
-    /// Radiant intensity in W/sr, linear Rec. 709.
-    pub intensity: DVec3,
 }
 
 /// A mesh in its place.
@@ -381,10 +374,9 @@ fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
         false => (Wear::ClearGlass, Some(0)),
     };
     let place = Placement { number, transform: DAffine3::IDENTITY, smooth: true };
-    let MeshFile { camera, lights, suns, scene_warnings, .. } = assembly.add(Files::Disk, path, wear, &place)?;
-    let (camera, mut lights, mut warnings) = (*camera, std::mem::take(lights), std::mem::take(scene_warnings));
-    let suns = std::mem::take(suns);
-    lights.extend(suns.iter().map(|sun| sun.over(assembly.bounds())));
+    let MeshFile { camera, lights, scene_warnings, .. } = assembly.add(Files::Disk, path, wear, &place)?;
+    let (camera, lights, mut warnings) = (*camera, std::mem::take(lights), std::mem::take(scene_warnings));
+    let lights = lights.iter().map(|light| light.over(assembly.bounds())).collect();
     // A file's camera looks along a direction: what it turns around lies as far off as the middle of the scene.
     let camera = camera.map(|camera| camera.aimed_at(assembly.bounds().center()));
     assembly.warnings.append(&mut warnings);

@@ -97,6 +97,8 @@ pub const LENGTH: Rule =
 /// A scale, which may mirror.
 pub const SCALE: Rule =
     Rule { wanted: "a number other than 0 from -1e9 to 1e9", holds: |x| (1e-9..=1e9).contains(&x.abs()) };
+/// An angle off an axis in degrees.
+pub const HALF_ANGLE: Rule = Rule { wanted: "an angle from 0 to 90 degrees", holds: |x| (0.0..=90.0).contains(&x) };
 /// A field of view in degrees.
 pub const FIELD: Rule = Rule { wanted: "an angle above 0 and below 180 degrees", holds: |x| x > 0.0 && x < 180.0 };
 

@@ -10,6 +10,8 @@ use vitrum::scene::{Dielectric, Dispersion, GLASSES, Opaque, Overrides, Scene, S
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
+const SPOT: &str = "[[light]]\nkind = \"spot\"\nposition = [0, 0, 0]\nintensity = [1, 1, 1]\ndirection = [0, -1, 0]\n";
+
 const EVERYTHING: &str = r#"
 [environment]
 image = "sky.png"
@@ -276,7 +278,26 @@ fn values_of_the_wrong_type_or_range_say_what_is_expected() {
         ("[environment]\ncolor = [1, 1, 1]\nrotation = inf".into(), "3: rotation: expected a finite number, found inf"),
         ("[environment]\ncolor = [1, 1, 1]\nvisible = 0".into(), "3: visible: expected true or false, found 0"),
         ("[[light]]\nposition = [0, 0, 0]".into(), "1: missing key \"kind\" in [[light]]"),
-        ("[[light]]\nkind = \"sun\"".into(), "2: kind: expected \"point\", found \"sun\""),
+        (
+            "[[light]]\nkind = \"sun\"".into(),
+            "2: kind: expected \"point\" or \"spot\" or \"directional\", found \"sun\"",
+        ),
+        (
+            "[[light]]\nkind = \"directional\"\ndirection = [0, 0, 0]\nirradiance = [1, 1, 1]".into(),
+            "3: direction: has no length",
+        ),
+        (
+            format!("{SPOT}inner_cone_angle = 30\nouter_cone_angle = 20"),
+            "1: [[light]]: inner_cone_angle 30 is not below outer_cone_angle 20",
+        ),
+        (
+            format!("{SPOT}outer_cone_angle = 91"),
+            "6: outer_cone_angle: expected an angle from 0 to 90 degrees, found 91",
+        ),
+        (
+            format!("{SPOT}irradiance = [1, 1, 1]"),
+            "6: unknown key \"irradiance\" in [[light]]; allowed here: kind, position, intensity, direction, inner_cone_angle, outer_cone_angle",
+        ),
         (
             "[[light]]\nkind = \"point\"\nposition = [0, 0, 0]\nintensity = [1, 1, -1]".into(),
             "4: intensity: expected a number from 0 to 1e9, found -1",

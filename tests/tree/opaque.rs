@@ -30,7 +30,7 @@ fn in_the_dark(parts: impl IntoIterator<Item = Part>, lights: Vec<PointLight>) -
 }
 
 fn light(position: DVec3) -> PointLight {
-    PointLight { position, intensity: DVec3::new(10.0, 4.0, 1.0) }
+    PointLight::new(position, DVec3::new(10.0, 4.0, 1.0))
 }
 
 /// Of each pixel the point of the board that its centre sees.

@@ -21,10 +21,11 @@ use gltf::scene::Transform;
 use gltf::{Document, Node, json};
 
 use super::files::Files;
+use super::light::{Cone, LightSource, PointLight, Sun};
 use super::mesh::{FARTHEST, Preparation};
-use super::mesh_file::{MeshFile, Part, Sun, shorten, worn};
+use super::mesh_file::{MeshFile, Part, shorten, worn};
 use super::table::SCALE;
-use super::{Camera, Material, PointLight};
+use super::{Camera, Material};
 use crate::{Error, Result};
 use accessor::Accessors;
 use container::{Container, Resources};
@@ -123,7 +124,7 @@ pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<MeshF
         let what = if lost == 1 { "triangle" } else { "triangles" };
         remarks.say(format!("{lost} degenerate {what} removed, and the parts that held nothing else"));
     }
-    let SceneParts { mut parts, camera, lights, suns, remarks: of_scene, flat, .. } = scene;
+    let SceneParts { mut parts, camera, lights, remarks: of_scene, flat, .. } = scene;
     if flat > 0 {
         let what = if flat == 1 { "node is" } else { "nodes are" };
         remarks.say(format!("{flat} {what} scaled by less than 1e-9 or more than 1e9; left out"));
@@ -136,7 +137,6 @@ pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<MeshF
         images,
         camera,
         lights,
-        suns,
         files: resources.read,
         warnings: remarks.into_lines(&file),
         material_warnings: of_materials.into_lines(&file),
@@ -216,8 +216,7 @@ fn roots(document: &Document) -> Vec<Node<'_>> {
 struct SceneParts {
     parts: Vec<Part>,
     camera: Option<Camera>,
-    lights: Vec<PointLight>,
-    suns: Vec<Sun>,
+    lights: Vec<LightSource>,
     remarks: Remarks,
     /// Nodes that are scaled to nothing.
     flat: usize,
@@ -278,44 +277,52 @@ impl SceneParts {
 
     fn light(&mut self, node: &Node<'_>, transform: &DAffine3) {
         let Some(light) = node.light() else { return };
-        match light.kind() {
-            Kind::Point => {
-                let intensity = light.intensity();
-                let color = DVec3::from_array(light.color().map(f64::from)) * f64::from(intensity);
-                let is_light = color.is_finite() && color.min_element() >= 0.0 && color.max_element() <= 1e9;
-                if !is_light || !is_near(transform.translation) {
-                    let wanted = "from 0 to 1e9, or its place not within 1e9 m";
-                    self.remarks
-                        .say(format!("light {}: intensity {intensity} is not {wanted}; left out", light.index()));
+        let (number, intensity) = (light.index(), light.intensity());
+        let color = DVec3::from_array(light.color().map(f64::from)) * f64::from(intensity);
+        let place = transform.translation;
+        let direction = transform.transform_vector3(DVec3::NEG_Z).try_normalize();
+        let is_sun = matches!(light.kind(), Kind::Directional);
+        if !color.is_finite() || color.min_element() < 0.0 || color.max_element() > 1e9 {
+            self.remarks.say(format!("light {number}: intensity {intensity} is not from 0 to 1e9; left out"));
+            return;
+        }
+        if !is_sun && !is_near(place) {
+            self.remarks.say(format!("light {number}: is not within 1e9 m; left out"));
+            return;
+        }
+        let point = PointLight::new(place, color);
+        let source = match light.kind() {
+            Kind::Point => LightSource::Point(point),
+            Kind::Directional => match direction {
+                Some(direction) => LightSource::Sun(Sun { direction, irradiance: color }),
+                None => {
+                    self.remarks.say(format!("light {number}: has no direction; left out"));
                     return;
                 }
-                if light.range().is_some() {
-                    self.remarks.leave_out("ranges of lights");
-                }
-                if intensity > BRIGHT {
-                    self.remarks.say(format!(
-                        "light {}: {intensity} candela, which count as W/sr: if it is too bright, export it without units",
-                        light.index()
-                    ));
-                }
-                self.lights.push(PointLight { position: transform.translation, intensity: color });
-            }
-            Kind::Directional => {
-                let intensity = light.intensity();
-                let irradiance = DVec3::from_array(light.color().map(f64::from)) * f64::from(intensity);
-                let direction = transform.transform_vector3(DVec3::NEG_Z).try_normalize();
-                let is_light =
-                    irradiance.is_finite() && irradiance.min_element() >= 0.0 && irradiance.max_element() <= 1e9;
-                match direction.filter(|_| is_light) {
-                    Some(direction) => self.suns.push(Sun { direction, irradiance }),
-                    None => self.remarks.say(format!(
-                        "light {}: intensity {intensity} is not from 0 to 1e9, or it has no direction; left out",
-                        light.index()
-                    )),
+            },
+            Kind::Spot { inner_cone_angle, outer_cone_angle } => {
+                let (inner, outer) = (f64::from(inner_cone_angle), f64::from(outer_cone_angle));
+                match direction.and_then(|direction| Cone::new(direction, inner, outer)) {
+                    cone @ Some(_) => LightSource::Point(PointLight { cone, ..point }),
+                    None => {
+                        self.remarks.say(format!(
+                            "light {number}: has no direction, or its angles {inner_cone_angle} and {outer_cone_angle} are \
+                             not 0 <= inner < outer <= pi/2; left out"
+                        ));
+                        return;
+                    }
                 }
             }
-            Kind::Spot { .. } => self.remarks.leave_out("spot lights"),
+        };
+        if !is_sun && light.range().is_some() {
+            self.remarks.leave_out("ranges of lights");
         }
+        if !is_sun && intensity > BRIGHT {
+            self.remarks.say(format!(
+                "light {number}: {intensity} candela, which count as W/sr: if it is too bright, export it without units"
+            ));
+        }
+        self.lights.push(source);
     }
 }
 
