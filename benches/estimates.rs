@@ -1,6 +1,6 @@
 //! What `--tolerance` promises, held against the true error on ten scenes: `cargo bench --bench estimates` prints the table of
 //! docs/auto.md. Arguments choose tolerances, and scenes by their names or a part of them, as
-//! `-- 0.1 0.01 ball`; without any it takes all of them, which is hours.
+//! `-- 0.1 0.01 ball`; without any it takes all of them, which is hours. Another one, as `8x6`, is the size of the pictures.
 //!
 //! What is counted are the pixels, each channel for itself, whose |x - r| / (r + 0.1) is below the tolerance. `tree` promises what it
 //! cuts off: r is the same samples followed on and on. `path` promises what its samples scatter: r is another picture of it, and the
@@ -153,7 +153,10 @@ fn main() -> Result<()> {
     if tolerances.is_empty() {
         tolerances = vec![1e-1, 1e-2, 1e-3];
     }
-    let is_name = |argument: &String| !argument.starts_with('-') && argument.parse::<f64>().is_err();
+    let asked = std::env::args().skip(1).find_map(|argument| argument.parse::<Size>().ok());
+    let is_name = |argument: &String| {
+        !argument.starts_with('-') && argument.parse::<f64>().is_err() && argument.parse::<Size>().is_err()
+    };
     let names: Vec<_> = std::env::args().skip(1).filter(is_name).collect();
     let wanted = std::env::var("VITRUM_DEVICE").ok();
     let instance = Instance::new(/* validation: */ false)?;
@@ -170,7 +173,7 @@ fn main() -> Result<()> {
         let mut scene = scene.clone();
         for &tolerance in &tolerances {
             let (width, height) = if tolerance < FINE { (16, 12) } else { (32, 24) };
-            let size = Size { width, height };
+            let size = asked.unwrap_or(Size { width, height });
             scene.frame(4.0 / 3.0);
             let tree = bench.tree(&scene, tolerance, Size { width: 64, height: 48 })?;
             let tree = tree.map_or("".into(), |share| format!("{:.2} %", 100.0 * share));

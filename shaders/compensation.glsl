@@ -24,6 +24,20 @@ float RoughAlbedo(uint table, float cosThetaI)
     return mix(albedos[table + low], albedos[table + low + 1], share);
 }
 
+// Surfaces whose roughness an image tells have so many tables, one after the other, of the roughnesses
+// SMOOTH_ROUGHNESS + (1 - SMOOTH_ROUGHNESS) (i / (ALBEDO_LEVELS - 1))^1.5.
+const uint ALBEDO_LEVELS = 16;
+
+// The same of a surface of this roughness; the first of its tables is `tables`.
+float RoughAlbedoAt(uint tables, float roughness, float cosThetaI)
+{
+    float share = clamp((roughness - SMOOTH_ROUGHNESS) / (1.0 - SMOOTH_ROUGHNESS), 0.0, 1.0);
+    float level = pow(share, 2.0 / 3.0) * float(ALBEDO_LEVELS - 1);
+    uint low = min(uint(level), ALBEDO_LEVELS - 2);
+    uint first = tables + low * ALBEDO_NODES;
+    return mix(RoughAlbedo(first, cosThetaI), RoughAlbedo(first + ALBEDO_NODES, cosThetaI), level - float(low));
+}
+
 // Indices that differ by more are not those of one interface at two wavelengths.
 const float FARTHEST_TABLE = 0.2;
 
@@ -50,6 +64,12 @@ uint RoughTable(uint tables, float etaI, float etaT)
 float RoughCompensation(uint table, float cosThetaI)
 {
     return table == 0 ? 1.0 : 1.0 / max(RoughAlbedo(table, cosThetaI), 1e-6);
+}
+
+// The same of a surface whose roughness an image tells.
+float RoughCompensationAt(uint tables, float roughness, float cosThetaI)
+{
+    return tables == 0 ? 1.0 : 1.0 / max(RoughAlbedoAt(tables, roughness, cosThetaI), 1e-6);
 }
 
 #endif

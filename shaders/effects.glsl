@@ -1,4 +1,4 @@
-// The effects: one specialization constant each, numbered and named as in the table of src/effects.rs.
+// The effects: one specialization constant each, numbered and named as in the table of src/effects.
 #ifndef EFFECTS_GLSL
 #define EFFECTS_GLSL
 

@@ -106,7 +106,8 @@ Met MetAt(Material material, Crossing crossing, vec3 wi)
     met.tint = material.baseColor;
     if (ENERGY_COMPENSATION && !met.isOpaque) {
         uint table = met.isPane ? material.albedoTable : RoughTable(material.albedoTables, met.etaI, met.etaT);
-        met.scale = RoughCompensation(table, met.wi.z);
+        bool isMapped = TEXTURES && material.finishMap != 0;
+        met.scale = isMapped ? RoughCompensationAt(table, material.roughness, met.wi.z) : RoughCompensation(table, met.wi.z);
     }
     return met;
 }

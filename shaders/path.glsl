@@ -27,7 +27,7 @@ layout(constant_id = 66) const bool SAMPLE_LIGHTS = true;
 layout(constant_id = 67) const bool SAMPLE_SURFACES = true;
 
 layout(set = 0, binding = 15, rgba32f) uniform image2D mean;    // radiance
-layout(set = 0, binding = 16, rgba32f) uniform image2D counts;  // interfaces, rays
+layout(set = 0, binding = 16, rgba32f) uniform image2D counts;  // interfaces, rays, throughput that was cut off
 layout(set = 0, binding = 17, rgba32f) uniform image2D spread;  // sum of squared differences of the batches' means from their mean, and their number
 
 // From here on a faint path may end, with a probability that those going on make up for.
@@ -79,14 +79,14 @@ float PowerHeuristic(float pdf, float other)
 }
 
 // Moves the means of a pixel by a batch of samples, and what says how far batches are from each other.
-void AddBatch(ivec2 place, vec3 value, float interfaces, float rays)
+void AddBatch(ivec2 place, vec3 value, vec3 counted)
 {
     Moments moments = Moments(value, vec3(0.0));
-    vec4 count = vec4(interfaces, rays, 0.0, 0.0);
+    vec4 count = vec4(counted, 0.0);
     if (sampleIndex != 0) {
         moments = WithOneMore(Moments(imageLoad(mean, place).rgb, imageLoad(spread, place).rgb), sampleIndex, value);
-        vec4 counted = imageLoad(counts, place);
-        count = counted + (count - counted) / float(sampleIndex + 1);
+        vec4 before = imageLoad(counts, place);
+        count = before + (count - before) / float(sampleIndex + 1);
     }
     imageStore(mean, place, vec4(moments.mean, 1.0));
     imageStore(spread, place, vec4(moments.squares, float(sampleIndex + 1)));
@@ -168,6 +168,7 @@ void main()
     vec3 sum = vec3(0.0);
     uint interfaces = 0;
     uint rays = 0;
+    float discarded = 0.0;
 
     Whereabouts atCamera = Whereabouts(frame.cameraMedium, Bodies(frame.cameraBodies));
     Ray path = Ray(vec3(0.0), vec3(0.0, 0.0, -1.0), vec3(0.0), LARGEST_FLOAT, atCamera, NOWHERE, NOWHERE, 0);
@@ -303,6 +304,7 @@ void main()
                 sum += weight * ray.throughput * material.emission / (crossing.etaI * crossing.etaI);
             }
             goesOn = depth < frame.maxDepth;
+            if (!goesOn) discarded += Largest(ray.throughput);
         }
 
         bool scatters = !isLight && meets && !passes;
@@ -397,7 +399,7 @@ void main()
     }
     float samples = float(samplesInBatch);
     float scale = frame.cameraIndex * frame.cameraIndex;
-    AddBatch(place, scale * sum / samples, float(interfaces) / samples, float(rays) / samples);
+    AddBatch(place, scale * sum / samples, vec3(interfaces, rays, discarded) / samples);
 }
 
 #endif

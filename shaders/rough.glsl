@@ -9,9 +9,6 @@
 #include "fresnel.glsl"
 #include "microfacet.glsl"
 
-// Up to the original's default a surface is smooth: its highlights are narrower than a pixel, and nothing else differs.
-const float SMOOTH_ROUGHNESS = 0.01;
-
 // Below this alpha, and between equal indices, an interface is smooth: nothing is spread, there is no density.
 const float LEAST_ALPHA = 1e-10;
 

@@ -146,7 +146,7 @@ pub enum Aov {
     Object,
     /// Scattering events per pixel
     Interfaces,
-    /// Throughput that `tree` cut off
+    /// Throughput that `tree` or `path` cut off
     Discarded,
     /// Standard error of a Monte Carlo mean
     Stderr,
@@ -317,7 +317,7 @@ pub struct RenderArgs {
     #[arg(long, value_name = "NAME")]
     pub tonemap: Option<Tonemap>,
 
-    /// Extra layers in the EXR; model single has normal, depth, object; tree also albedo, interfaces, discarded; path and double stderr in place of discarded
+    /// Extra layers in the EXR; model single has normal, depth, object; tree and path also albedo, interfaces, discarded; path and double stderr, double albedo and interfaces
     #[arg(long, value_name = "NAME", value_delimiter = ',')]
     pub aov: Option<Vec<Aov>>,
 

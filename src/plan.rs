@@ -168,7 +168,9 @@ impl Plan {
         let has: &[Aov] = match model {
             Model::Single => &[Aov::Normal, Aov::Depth, Aov::Object],
             Model::Tree => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded],
-            Model::Path => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Stderr],
+            Model::Path => {
+                &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Discarded, Aov::Stderr]
+            }
             Model::Double => &[Aov::Normal, Aov::Depth, Aov::Albedo, Aov::Object, Aov::Interfaces, Aov::Stderr],
         };
         if args.tolerance.is_some() && model == Model::Single {

@@ -19,8 +19,8 @@ use vitrum::options::{Model, RenderArgs, Size};
 use vitrum::passes::{Rendered, render};
 use vitrum::plan::Plan;
 use vitrum::scene::{
-    Coating, Cutout, Dielectric, Dispersion, Environment, NormalMap, Opaque, Overrides, Panorama, PointLight, Scene,
-    Surface, Surroundings, Texels, Texture, TextureMap,
+    Coating, Cone, Cutout, Dielectric, Dispersion, Environment, NormalMap, Opaque, Overrides, Panorama, PointLight,
+    Scene, Surface, Surroundings, Texels, Texture, TextureMap,
 };
 
 /// What a generated scene has beside clear glass: each has it, for every set of effects makes shaders of its own, and those that

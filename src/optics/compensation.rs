@@ -5,6 +5,7 @@
 //! leaves the surface after one bounce when light comes at the given angle: surroundings of radiance 1 then show radiance 1.
 
 use super::rough::RoughInterface;
+use crate::effects::SMOOTH;
 use crate::parallel;
 
 /// E by the cosine of incidence, for one interface and side: nodes at cosines (i / (NODES - 1))^3, dense where light grazes the
@@ -25,6 +26,15 @@ const LEAST_COSINE: f64 = 1e-5;
 const NORMALS: u32 = 2584;
 const NORMALS_GRAZING: u32 = 10946;
 const GRAZING: f64 = 0.05;
+
+/// Tables of a surface whose roughness an image tells, one for each of so many roughnesses.
+pub const LEVELS: usize = 16;
+
+/// The roughness of a level, which need not be whole: dense where a surface is nearly smooth, whose albedo falls steeply where
+/// light grazes it.
+pub fn roughness_of_level(level: f64) -> f64 {
+    SMOOTH + (1.0 - SMOOTH) * (level / (LEVELS - 1) as f64).powf(1.5)
+}
 
 /// The cosine of a node.
 fn node(i: usize) -> f64 {
@@ -60,14 +70,40 @@ impl AlbedoTable {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::effects::SMOOTH;
 
     #[test]
     fn shaders_have_the_same_nodes_and_the_same_threshold() {
         let nodes = include_str!("../../shaders/compensation.glsl");
         assert!(nodes.contains(&format!("const uint ALBEDO_NODES = {NODES};")));
-        let threshold = include_str!("../../shaders/rough.glsl");
+        assert!(nodes.contains(&format!("const uint ALBEDO_LEVELS = {LEVELS};")));
+        let threshold = include_str!("../../shaders/constants.glsl");
         assert!(threshold.contains(&format!("const float SMOOTH_ROUGHNESS = {SMOOTH};")));
+    }
+
+    /// What an image of the roughness takes from the levels on its sides is right within 2 %.
+    #[test]
+    fn levels_of_roughness_are_close_enough() {
+        let mut worst = (0.0, String::new());
+        for (eta_i, eta_t) in [(1.0, 1.5), (1.5, 1.0), (2.42, 1.0), (1.0, 1e12)] {
+            let table =
+                |roughness: f64| AlbedoTable::new(RoughInterface { alpha: roughness * roughness, eta_i, eta_t });
+            let mut low = table(roughness_of_level(0.0));
+            for i in 1..LEVELS {
+                let high = table(roughness_of_level(i as f64));
+                let between = table(roughness_of_level(i as f64 - 0.5));
+                for degrees in [0.0_f64, 30.0, 45.0, 60.0, 80.0, 88.0, 89.0, 89.8] {
+                    let cosine = degrees.to_radians().cos();
+                    let found = 0.5 * (low.albedo(cosine) + high.albedo(cosine));
+                    let error = (found / between.albedo(cosine) - 1.0).abs();
+                    if error > worst.0 {
+                        worst = (error, format!("level {i}, {eta_i} to {eta_t}, {degrees} degrees"));
+                    }
+                }
+                low = high;
+            }
+        }
+        println!("worst {:.2e}: {}", worst.0, worst.1);
+        assert!(worst.0 < 0.02, "{:.1e}: {}", worst.0, worst.1);
     }
 
     /// With the table a white furnace is white within 1 %, from normal incidence to 89.9 degrees.

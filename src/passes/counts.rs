@@ -8,7 +8,7 @@ use libm::erf;
 /// Means over the samples of each pixel, row 0 at the top.
 #[derive(Clone, Debug)]
 pub struct Counts {
-    /// Throughput that `tree` cut off.
+    /// Throughput that `tree` or `path` cut off.
     pub discarded: Option<Vec<f32>>,
     /// Standard error of the radiance that `path` or `double` found, of each channel; infinite with a single batch of samples.
     pub stderr: Option<Vec<[f32; 3]>>,
@@ -25,7 +25,8 @@ impl Counts {
     }
 
     pub(super) fn of_paths(counts: &[u8], spread: &[u8], samples: u32) -> Self {
-        Self { stderr: Some(errors(spread)), ..Self::new(counts, samples) }
+        let discarded = texels(counts).iter().map(|&[.., discarded, _]| discarded).collect();
+        Self { discarded: Some(discarded), stderr: Some(errors(spread)), ..Self::new(counts, samples) }
     }
 
     /// Of `double`: each sample is a batch, and `mean` holds interfaces beside radiance.

@@ -11,7 +11,7 @@ use super::view::View;
 use crate::effects::{Effect, SMOOTH};
 use crate::gpu::MaterialRecord;
 use crate::image;
-use crate::optics::compensation::AlbedoTable;
+use crate::optics::compensation::{AlbedoTable, LEVELS, roughness_of_level};
 use crate::optics::medium::absorption;
 use crate::optics::rough::RoughInterface;
 use crate::optics::spectrum::luminance;
@@ -26,27 +26,55 @@ const MIRROR: f64 = 1e12;
 struct Albedos {
     /// Nothing stands at 0, which says that there is no table.
     values: Vec<f32>,
-    tables: Vec<(RoughInterface, u32)>,
+    tables: Vec<(Facets, f64, f64, u32)>,
+}
+
+/// How rough a surface is.
+#[derive(Clone, Copy, PartialEq)]
+enum Facets {
+    /// By a number.
+    Alpha(f64),
+    /// By an image that is nowhere rougher than this.
+    UpTo(f64),
+}
+
+impl Facets {
+    /// Alpha of each table.
+    fn alphas(self) -> Vec<f64> {
+        match self {
+            Self::Alpha(alpha) => vec![alpha],
+            // Levels above are never looked up, but for the one that the roughest texel lies below.
+            Self::UpTo(most) => {
+                let levels = (0..LEVELS).map(|level| roughness_of_level(level as f64));
+                let first_above = levels.clone().position(|roughness| roughness >= most).unwrap_or(LEVELS - 1);
+                levels.take(first_above.max(1) + 1).map(|roughness| roughness * roughness).collect()
+            }
+        }
+    }
 }
 
 impl Albedos {
-    /// The first node of the table of `interface`.
-    fn table(&mut self, interface: RoughInterface) -> u32 {
-        if let Some(&(_, first)) = self.tables.iter().find(|(other, _)| *other == interface) {
+    /// The first node of the tables of an interface.
+    fn table(&mut self, facets: Facets, eta_i: f64, eta_t: f64) -> u32 {
+        let known = self.tables.iter().find(|(a, b, c, _)| (*a, *b, *c) == (facets, eta_i, eta_t));
+        if let Some(&(.., first)) = known {
             return first;
         }
         let first = self.values.len() as u32;
-        self.values.extend(AlbedoTable::new(interface).nodes().iter().map(|&albedo| albedo as f32));
-        self.tables.push((interface, first));
+        for alpha in facets.alphas() {
+            let table = AlbedoTable::new(RoughInterface { alpha, eta_i, eta_t });
+            self.values.extend(table.nodes().iter().map(|&albedo| albedo as f32));
+        }
+        self.tables.push((facets, eta_i, eta_t, first));
         first
     }
 
     /// Where the tables of all pairs are listed that `ior` makes with `others`, from either side.
-    fn pairs(&mut self, alpha: f64, ior: f64, others: &[f64]) -> u32 {
+    fn pairs(&mut self, facets: Facets, ior: f64, others: &[f64]) -> u32 {
         let mut list = Vec::new();
         for &other in others.iter().filter(|&&other| other != ior) {
             for (eta_i, eta_t) in [(other, ior), (ior, other)] {
-                let first = self.table(RoughInterface { alpha, eta_i, eta_t });
+                let first = self.table(facets, eta_i, eta_t);
                 list.extend([eta_i as f32, eta_t as f32, first as f32]);
             }
         }
@@ -90,19 +118,18 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View, maps: &Maps) ->
         let (mut albedo_table, mut albedo_tables) = (0, 0);
         // In other media than air facets of index 1 lose light too.
         let sees_media = matches!(plan.model, Model::Path | Model::Double);
+        let is_mapped = means.looks && glass.metallic_roughness_texture.is_some();
         let loses = is_rough(material) || sees_media && roughness > SMOOTH;
-        // There is a table for each roughness, and an image has many.
-        let loses = loses && !(means.looks && glass.metallic_roughness_texture.is_some());
         if plan.effects.contains(Effect::EnergyCompensation) && loses {
-            let alpha = roughness * roughness;
+            let facets = if is_mapped { Facets::UpTo(roughness) } else { Facets::Alpha(roughness * roughness) };
             let is_pane = glass.thin_walled && plan.effects.contains(Effect::ThinWalled);
             match plan.model {
                 Model::Path if is_pane => {
                     // Both lobes of a pane are masked as those of a mirror, and lose the same.
-                    albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: MIRROR });
+                    albedo_table = albedos.table(facets, 1.0, MIRROR);
                 }
-                Model::Path | Model::Double => albedo_tables = albedos.pairs(alpha, ior, &others),
-                _ => albedo_table = albedos.table(RoughInterface { alpha, eta_i: 1.0, eta_t: ior }),
+                Model::Path | Model::Double => albedo_tables = albedos.pairs(facets, ior, &others),
+                _ => albedo_table = albedos.table(facets, 1.0, ior),
             }
         }
         // Infinite where a colour is 0: so dark that nothing is left after a millionth of the scene.
@@ -161,7 +188,7 @@ impl Maps {
     pub(super) fn new(scene: &Scene, plan: &Plan) -> Self {
         let mut maps = Self::default();
         if [Effect::Textures, Effect::NormalMaps, Effect::Cutouts].iter().any(|&effect| plan.effects.contains(effect)) {
-            for &map in scene.materials.iter().flat_map(Material::maps) {
+            for map in scene.materials.iter().flat_map(Material::maps) {
                 let next = maps.all.len() as u32 + 1;
                 if *maps.numbers.entry(key(&map)).or_insert(next) == next {
                     maps.all.push(map);

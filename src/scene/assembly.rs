@@ -11,9 +11,9 @@ use glam::{DAffine3, DVec3};
 
 use super::files::Files;
 use super::mesh::{FARTHEST, Preparation};
-use super::mesh_file::{Image, MeshFile};
+use super::mesh_file::{Image, ImageSource, MeshFile};
 use super::texture::Textures;
-use super::{Bounds, Material, Mesh, Object, Opaque, Surface};
+use super::{Bounds, Material, Mesh, Object, Opaque, Surface, TextureMap};
 use crate::Result;
 
 /// Meshes, objects, materials and textures so far.
@@ -189,11 +189,16 @@ fn open_images(
     warnings: &mut Vec<String>,
 ) {
     let name = material.name.clone();
+    let finish = match &material.surface {
+        Surface::Opaque(opaque) => opaque.metallic_roughness_texture,
+        Surface::Dielectric(glass) => glass.metallic_roughness_texture,
+    };
     let color = match &material.surface {
         Surface::Opaque(opaque) => opaque.base_color_texture,
         Surface::Dielectric(_) => None,
     };
-    let replaces_color = color.is_some_and(|map| images[map.texture].replaces_color);
+    let replaced = |map: Option<TextureMap>| map.map(|map| &images[map.texture]).filter(|image| image.replaces);
+    let (color, finish) = (replaced(color).is_some(), replaced(finish).map(|image| &image.source));
     let shines = matches!(&material.surface, Surface::Opaque(opaque) if opaque.emission_texture.is_some());
     material.retain_maps(|map| match textures.open(files, &images[map.texture], warnings) {
         Ok(texture) => {
@@ -212,8 +217,18 @@ fn open_images(
         *emission = DVec3::ZERO;
     }
     if let Surface::Opaque(Opaque { base_color, base_color_texture: Some(_), .. }) = &mut material.surface
-        && replaces_color
+        && color
     {
         *base_color = DVec3::ONE;
+    }
+    if let Some(ImageSource::Finish([rough, metal])) = finish {
+        match &mut material.surface {
+            Surface::Opaque(opaque) if opaque.metallic_roughness_texture.is_some() => {
+                opaque.roughness = if rough.is_some() { 1.0 } else { opaque.roughness };
+                opaque.metallic = if metal.is_some() { 1.0 } else { opaque.metallic };
+            }
+            Surface::Dielectric(glass) if glass.metallic_roughness_texture.is_some() => glass.roughness = 1.0,
+            _ => {}
+        }
     }
 }

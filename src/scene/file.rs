@@ -306,7 +306,7 @@ impl Reader<'_> {
     ) -> Result<Option<TextureMap>> {
         let Some(entry) = table.get(key) else { return Ok(None) };
         let image =
-            Image { source: ImageSource::File(entry.file(self.files, self.folder)?), encoding, replaces_color: false };
+            Image { source: ImageSource::File(entry.file(self.files, self.folder)?), encoding, replaces: false };
         let texture = assembly.textures.open(self.files, &image, &mut assembly.warnings);
         let texture = texture.map_err(|error| entry.error(format!("{}: {}", entry.key, error.in_full())))?;
         Ok(Some(TextureMap::of(texture)))

@@ -186,23 +186,13 @@ impl Material {
     }
 
     /// The images that it wears.
-    pub fn maps(&self) -> impl Iterator<Item = &TextureMap> {
-        let of_surface = match &self.surface {
-            Surface::Dielectric(glass) => {
-                let coating = glass.coating.as_deref();
-                let color = coating.and_then(|coating| coating.base_color_texture.as_ref());
-                let transmission = coating.and_then(|coating| coating.transmission_texture.as_ref());
-                [color, glass.metallic_roughness_texture.as_ref(), transmission]
-            }
-            Surface::Opaque(opaque) => [
-                opaque.base_color_texture.as_ref(),
-                opaque.metallic_roughness_texture.as_ref(),
-                opaque.emission_texture.as_ref(),
-            ],
-        };
-        let normal = self.normal_map.as_ref().map(|normal| &normal.map);
-        let alpha = self.cutout.as_ref().and_then(|cutout| cutout.map.as_ref());
-        of_surface.into_iter().chain([normal, alpha]).flatten()
+    pub fn maps(&self) -> Vec<TextureMap> {
+        let mut maps = Vec::new();
+        self.clone().retain_maps(|map| {
+            maps.push(*map);
+            true
+        });
+        maps
     }
 
     /// Takes the images off that `keep` says no to.
@@ -214,11 +204,11 @@ impl Material {
         };
         match &mut self.surface {
             Surface::Dielectric(glass) => {
+                let mut none = Coating::default();
+                let coating = glass.coating.as_deref_mut().unwrap_or(&mut none);
+                check(&mut coating.base_color_texture);
                 check(&mut glass.metallic_roughness_texture);
-                if let Some(coating) = &mut glass.coating {
-                    check(&mut coating.base_color_texture);
-                    check(&mut coating.transmission_texture);
-                }
+                check(&mut coating.transmission_texture);
             }
             Surface::Opaque(opaque) => {
                 check(&mut opaque.base_color_texture);
@@ -226,9 +216,8 @@ impl Material {
                 check(&mut opaque.emission_texture);
             }
         }
-        if let Some(cutout) = &mut self.cutout {
-            check(&mut cutout.map);
-        }
+        let mut none = None;
+        check(self.cutout.as_mut().map_or(&mut none, |cutout| &mut cutout.map));
         if self.normal_map.as_mut().is_some_and(|normal| !keep(&mut normal.map)) {
             self.normal_map = None;
         }

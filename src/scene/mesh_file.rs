@@ -57,8 +57,8 @@ pub struct Image {
     pub source: ImageSource,
     /// What they stand for.
     pub encoding: Encoding,
-    /// Whether it stands in the place of the base colour, not multiplied with it.
-    pub replaces_color: bool,
+    /// Whether it stands in the place of the numbers that it would be multiplied with.
+    pub replaces: bool,
 }
 
 /// Where the bytes of an image are.
@@ -73,6 +73,17 @@ pub enum ImageSource {
         /// As an image file holds them.
         bytes: Arc<[u8]>,
     },
+    /// In a file for roughness, one for what is metal, or both.
+    Finish([Option<Channel>; 2]),
+}
+
+/// One number of each texel of an image file.
+#[derive(Clone, Debug, PartialEq, Eq, Hash)]
+pub struct Channel {
+    /// The file.
+    pub path: PathBuf,
+    /// Red, green, blue or alpha; `None`: how bright it is.
+    pub number: Option<usize>,
 }
 
 impl MeshFile {

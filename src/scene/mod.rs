@@ -11,6 +11,7 @@ mod camera;
 mod containment;
 mod doctor;
 mod environment;
+mod faults;
 mod file;
 mod files;
 mod gltf;
@@ -31,7 +32,6 @@ mod topology;
 mod touching;
 mod walls;
 
-use std::collections::HashSet;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -52,8 +52,9 @@ pub use touching::Touch;
 use crate::options::RenderArgs;
 use crate::{Error, Result};
 use assembly::{Assembly, Placement, Wear};
+use faults::{faults_of_meshes, missing_uvs, panes_of_open_bodies};
 use file::{EnvironmentTable, Light, SceneFile};
-use mesh_file::{MeshFile, shorten};
+use mesh_file::MeshFile;
 
 /// Everything that a picture shows.
 #[derive(Clone, Debug)]
@@ -181,8 +182,6 @@ impl Scene {
             material.cutout = material.cutout.filter(|cutout| !is_whole(cutout));
         }
         let opened = panes_of_open_bodies(&mut objects, &meshes, &mut materials, &decided);
-        warnings.splice(0..0, faults_of_meshes(&objects, &meshes, &materials, &opened));
-        warn_of_missing_uvs(&objects, &meshes, &materials, &textures, &mut warnings);
         for material in &mut materials {
             if let Surface::Dielectric(dielectric) = &mut material.surface {
                 if let Some(ior) = overrides.ior {
@@ -222,6 +221,10 @@ impl Scene {
             files,
         };
         scene.set(&overrides.settings)?;
+        let faults = faults_of_meshes(&scene, &opened);
+        scene.warnings.splice(0..0, faults);
+        let bare = missing_uvs(&scene);
+        scene.warnings.extend(bare);
         Ok(scene)
     }
 
@@ -247,122 +250,6 @@ impl Scene {
         let bounds = self.objects.iter().fold(Bounds::EMPTY, |all, object| all.union(self.bounds_of(object)));
         (!bounds.is_empty()).then_some(bounds)
     }
-}
-
-/// Bodies whose holes are a larger share of their area than this are none: a jug without a lid is a sheet, one with a crack is a jug.
-const OPEN: f64 = 0.05;
-
-/// Makes panes of bodies that are none, unless a scene file `decided` on it; out flow their meshes. A material that closed bodies wear
-/// too is there twice then.
-fn panes_of_open_bodies(
-    objects: &mut [Object],
-    meshes: &[Arc<Mesh>],
-    materials: &mut Vec<Material>,
-    decided: &HashSet<usize>,
-) -> HashSet<usize> {
-    let is_open: Vec<bool> = objects
-        .iter()
-        .map(|object| meshes[object.mesh].holes > OPEN && joined_holes(object, objects, meshes) > OPEN)
-        .collect();
-    let mut opened = HashSet::new();
-    for number in 0..materials.len() {
-        if materials[number].surface.body().is_none() || decided.contains(&number) {
-            continue;
-        }
-        let wearing = || objects.iter().zip(&is_open).filter(|(object, _)| object.material == number);
-        if !wearing().any(|(_, open)| *open) {
-            continue;
-        }
-        opened.extend(wearing().filter(|(_, open)| **open).map(|(object, _)| object.mesh));
-        let mut pane = number;
-        if !wearing().all(|(_, open)| *open) {
-            pane = materials.len();
-            let own = materials[number].clone();
-            materials.push(Material { name: format!("{}, thin-walled", own.name), ..own });
-        }
-        if let Surface::Dielectric(glass) = &mut materials[pane].surface {
-            glass.thin_walled = true;
-        }
-        let worn = objects.iter_mut().zip(&is_open).filter(|(object, open)| object.material == number && **open);
-        worn.for_each(|(object, _)| object.material = pane);
-    }
-    opened
-}
-
-/// The share of holes of an object together with what else there is of it: a file cuts a bottle where its label begins.
-fn joined_holes(object: &Object, objects: &[Object], meshes: &[Arc<Mesh>]) -> f64 {
-    let is_part = |other: &&Object| (other.number, other.transform) == (object.number, object.transform);
-    let (mut positions, mut triangles) = (Vec::new(), Vec::new());
-    for part in objects.iter().filter(is_part) {
-        let (mesh, first) = (&meshes[part.mesh], positions.len() as u32);
-        positions.extend(&mesh.positions);
-        triangles.extend(mesh.triangles.iter().map(|triangle| triangle.map(|vertex| vertex + first)));
-    }
-    topology::share_of_holes(&positions, &triangles)
-}
-
-/// What is wrong with meshes, as far as it shows on what they are: only a medium wants a closed surface.
-fn faults_of_meshes(
-    objects: &[Object],
-    meshes: &[Arc<Mesh>],
-    materials: &[Material],
-    opened: &HashSet<usize>,
-) -> Vec<String> {
-    let mut bounds_medium = vec![false; meshes.len()];
-    for object in objects {
-        bounds_medium[object.mesh] |= materials[object.material].surface.body().is_some();
-    }
-    let mut warnings = Vec::new();
-    for (number, (mesh, bounds_medium)) in meshes.iter().zip(bounds_medium).enumerate() {
-        let is_pane = opened.contains(&number);
-        let open_edges = if bounds_medium || is_pane { mesh.faults.open_edges } else { 0 };
-        let faults = MeshFaults { open_edges, ..mesh.faults };
-        if faults.is_empty() {
-            continue;
-        }
-        let advice = if is_pane {
-            let holes = (mesh.holes * 100.0).round();
-            format!(
-                "; its holes are {holes} % of its area: it bounds no medium and counts as thin_walled = true, unless its [material] or --set has another"
-            )
-        } else if bounds_medium && !faults.is_closed() {
-            "; the surface is not closed and bounds no medium well: --repair may close it, or it wants thin_walled = true"
-                .into()
-        } else {
-            String::new()
-        };
-        warnings.push(format!("{}: {faults}{advice}", mesh.name));
-    }
-    shorten(&mut warnings, 0, "meshes have faults");
-    let before = warnings.len();
-    warnings.extend(meshes.iter().filter_map(|mesh| mesh.mending.told(mesh)));
-    shorten(&mut warnings, before, "meshes were repaired");
-    warnings
-}
-
-/// Says which meshes wear a texture but have no coordinates for it.
-fn warn_of_missing_uvs(
-    objects: &[Object],
-    meshes: &[Arc<Mesh>],
-    materials: &[Material],
-    textures: &[Arc<Texture>],
-    warnings: &mut Vec<String>,
-) {
-    let before = warnings.len();
-    let mut told = HashSet::new();
-    for object in objects {
-        let (mesh, material) = (&meshes[object.mesh], &materials[object.material]);
-        let Some(TextureMap { texture, .. }) = material.maps().next() else { continue };
-        if mesh.uvs.is_empty() && told.insert((object.mesh, object.material)) {
-            warnings.push(format!(
-                "{}: has no texture coordinates; material {:?} shows the corner of {} all over it",
-                mesh.name,
-                material.name,
-                textures[*texture].name()
-            ));
-        }
-    }
-    shorten(warnings, before, "meshes lack texture coordinates");
 }
 
 /// A mesh file in the default environment: glTF as the scene that it is, anything else as clear glass.

@@ -5,27 +5,28 @@
 //! | --- | --- |
 //! | `illum` 4, 6, 7 or 9; or `d` below 1 (`Tr` above 0); or a `Ni` other than 1 with neither `illum` nor `d` | a dielectric, else opaque |
 //! | `Ni` | index of a dielectric; absent or 0: 1.5 |
-//! | `Pr` | roughness of both |
+//! | `Pr`, `map_Pr` | roughness of both; the image stands in the place of the number |
 //! | `Tf` | `attenuation_color` of a dielectric at 1 m, MTL having no distance |
-//! | `Kd`, `map_Kd`, `Pm`, `Ke` | base colour and its image, metallic, emission of an opaque surface |
+//! | `Kd`, `map_Kd`, `Pm`, `map_Pm`, `Ke` | base colour, metallic and their images, emission of an opaque surface |
 //! | `illum` 0 or 1, or black `Ks` | no specular reflection of an opaque surface |
 //! | `map_Ke` | image of the emission, multiplied by `Ke` unless that is black |
 //! | `norm`; `map_Bump` or `bump` with `-bm` | map of normals; what does not look like one are heights, in texels; its strength |
 //! | `map_d` | the surface is not there where it is darker than a half, or its alpha below |
+//! | `-s`, `-o`, `-clamp on`, `-imfchan` of an image | scale and offset of coordinates, what lies beyond it, the number that counts of roughness and metal |
 //!
 //! A line that cannot be understood is left out with a remark, a value out of range is moved to the nearest end of the
 //! range with a remark: an MTL file is a by-product, and many are careless. `tobj` reads a text without such lines,
 //! because it gives up on them or panics.
 
 use std::collections::HashSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-use glam::DVec3;
+use glam::{DMat2, DVec2, DVec3};
 
 use super::files::Files;
-use super::maps::{Cutout, NormalMap, TextureMap};
+use super::maps::{Cutout, NormalMap, TextureMap, Wrap};
 use super::material::{Dielectric, Material, Opaque, Surface};
-use super::mesh_file::{Image, ImageSource, shorten};
+use super::mesh_file::{Channel, Image, ImageSource, shorten};
 use super::texture::Encoding;
 
 /// Metres over which `Tf` is taken to act.
@@ -117,42 +118,78 @@ fn tidy_line(line: &str) -> Option<String> {
             Some(format!("{keyword} {number}"))
         }
         "illum" => rest.split_whitespace().next()?.parse().ok().map(|model: u8| format!("illum {model}")),
-        "map_Kd" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d" | "norm" => {
-            image_name(rest).map(|name| format!("{keyword} {name}"))
-        }
-        "map_Bump" | "map_bump" | "bump" => image_name(rest).map(|name| {
-            let words: Vec<_> = rest.split_whitespace().collect();
-            let strength = words.array_windows().find(|[option, _]| *option == "-bm");
-            let strength = strength.and_then(|[_, number]| number.parse::<f32>().ok()).filter(|x| x.is_finite());
-            let strength = strength.unwrap_or(1.0).clamp(-1e3, 1e3);
+        "map_Kd" | "map_Ke" | "map_Pr" | "map_Pm" | "map_d" | "norm" | "map_Bump" | "map_bump" | "bump" => {
             // Under names of our own, which tobj leaves as they are.
-            format!("bump_strength {strength}\nbump_image {name}")
-        }),
+            let keyword = if keyword.ends_with("ump") { "bump_image" } else { keyword };
+            image_of(rest).map(|(options, name)| format!("{keyword}_options {}\n{keyword} {name}", options.join(" ")))
+        }
+        "map_Ks" | "map_Ns" | "map_Tr" => Some(format!("{keyword} {rest}")),
         _ => Some(String::new()),
     }
 }
 
-/// The file name of a map, without the options in front of it.
-fn image_name(mut rest: &str) -> Option<String> {
-    let take_word = |text: &mut &str| {
-        let (word, others) = text.split_once(char::is_whitespace).unwrap_or((text, ""));
-        let word = word.to_owned();
-        *text = others.trim_start();
-        word
-    };
-    while rest.starts_with('-') {
-        let values = match take_word(&mut rest).as_str() {
+/// The options of a map and its file name.
+fn image_of(rest: &str) -> Option<(Vec<&str>, &str)> {
+    let first_word = |text: &str| text.find(char::is_whitespace).unwrap_or(text.len());
+    let (mut options, mut name) = (Vec::new(), rest);
+    while name.starts_with('-') {
+        let option = &name[..first_word(name)];
+        let values = match option {
             "-mm" => 2,
             "-o" | "-s" | "-t" => {
-                rest.split_whitespace().take(3).take_while(|word| word.parse::<f32>().is_ok()).count()
+                let numbers = name.split_whitespace().skip(1).take(3);
+                numbers.take_while(|word| word.parse::<f32>().is_ok()).count()
             }
             _ => 1,
         };
-        for _ in 0..values {
-            take_word(&mut rest);
+        for _ in 0..=values {
+            let end = first_word(name);
+            options.extend((end > 0).then_some(&name[..end]));
+            name = name[end..].trim_start();
         }
     }
-    (!rest.is_empty()).then(|| rest.to_owned())
+    (!name.is_empty()).then_some((options, name))
+}
+
+/// How an image is to be looked at.
+struct ImageOptions {
+    map: TextureMap,
+    /// Its strength as a bump.
+    strength: f64,
+    /// The number of a texel that counts; `None`: how bright it is.
+    channel: Option<usize>,
+    /// The first that is not read.
+    unknown: Option<String>,
+}
+
+impl ImageOptions {
+    fn new(words: &[&str]) -> Self {
+        let mut options = Self { map: TextureMap::of(0), strength: 1.0, channel: None, unknown: None };
+        let (mut scale, mut offset) = (DVec2::ONE, DVec2::ZERO);
+        // A number begins with a sign, too.
+        let is_option = |word: &&&str| word.starts_with('-') && word.parse::<f64>().is_err();
+        let mut rest = words.iter().peekable();
+        while let Some(&option) = rest.next() {
+            let mut values = Vec::new();
+            while let Some(&value) = rest.next_if(|word| !is_option(word)) {
+                values.push(value);
+            }
+            let number = |i: usize| values.get(i).and_then(|word| word.parse().ok()).filter(|x: &f64| x.abs() <= 1e6);
+            match option {
+                "-s" => scale = DVec2::new(number(0).unwrap_or(1.0), number(1).unwrap_or(1.0)),
+                "-o" => offset = DVec2::new(number(0).unwrap_or(0.0), number(1).unwrap_or(0.0)),
+                "-bm" => options.strength = number(0).unwrap_or(1.0).clamp(-1e3, 1e3),
+                "-clamp" if values == ["on"] => options.map.wrap = [Wrap::Clamp; 2],
+                "-imfchan" => options.channel = ["r", "g", "b", "m"].iter().position(|name| values == [*name]),
+                "-clamp" | "-blendu" | "-blendv" | "-boost" | "-texres" | "-type" | "-cc" => {}
+                other => options.unknown = options.unknown.or(Some(other.to_owned())),
+            }
+        }
+        options.map.turn = DMat2::from_diagonal(scale);
+        // MTL's v points upwards.
+        options.map.offset = DVec2::new(offset.x, 1.0 - scale.y - offset.y);
+        options
+    }
 }
 
 struct Converter<'a> {
@@ -167,9 +204,8 @@ impl Converter<'_> {
     fn convert(mut self) -> Material {
         let surface =
             if self.is_dielectric() { Surface::Dielectric(self.dielectric()) } else { Surface::Opaque(self.opaque()) };
-        if let Some(key) = ["map_Pr", "map_Pm", "map_Ks", "map_Ns", "map_Tr"]
-            .into_iter()
-            .find(|key| self.material.unknown_param.contains_key(*key))
+        if let Some(key) =
+            ["map_Ks", "map_Ns", "map_Tr"].into_iter().find(|key| self.material.unknown_param.contains_key(*key))
         {
             self.remark(&format!("{key} is not read; the number is used"));
         }
@@ -202,6 +238,7 @@ impl Converter<'_> {
         };
         let roughness =
             self.number("Pr").map_or(clear.roughness, |r| self.within("Pr", r.into(), 0.0, 1.0, clear.roughness));
+        let metallic_roughness_texture = self.finish(&["map_Pr"]);
         let filter =
             self.triple("Tf").map(|filter| self.color("Tf", filter, 1.0)).filter(|&filter| filter != DVec3::ONE);
         let (attenuation_color, attenuation_distance) = match filter {
@@ -212,7 +249,7 @@ impl Converter<'_> {
             }
             Some(filter) => (filter, FILTER_DISTANCE),
         };
-        Dielectric { ior, roughness, attenuation_color, attenuation_distance, ..clear }
+        Dielectric { ior, roughness, metallic_roughness_texture, attenuation_color, attenuation_distance, ..clear }
     }
 
     fn opaque(&mut self) -> Opaque {
@@ -233,7 +270,7 @@ impl Converter<'_> {
             base_color_texture,
             metallic,
             roughness,
-            metallic_roughness_texture: None,
+            metallic_roughness_texture: self.finish(&["map_Pr", "map_Pm"]),
             ior: plain.ior,
             specular,
             emission,
@@ -246,7 +283,7 @@ impl Converter<'_> {
             return Some(NormalMap { map, scale: 1.0 });
         }
         let map = self.map("bump_image", Encoding::Bump)?;
-        Some(NormalMap { map, scale: self.number("bump_strength").map_or(1.0, f64::from) })
+        Some(NormalMap { map, scale: self.options("bump_image").strength })
     }
 
     /// Where an image of `d` is black the surface is not there.
@@ -255,6 +292,49 @@ impl Converter<'_> {
     }
 
     fn map(&mut self, key: &str, encoding: Encoding) -> Option<TextureMap> {
+        let path = self.file(key)?;
+        // Exporters write anything for the colour beside an image.
+        let image = Image { source: ImageSource::File(path), encoding, replaces: key == "map_Kd" };
+        Some(self.placed(key, image))
+    }
+
+    /// The images of roughness and metal, as far as there are, as one.
+    fn finish(&mut self, keys: &[&str]) -> Option<TextureMap> {
+        let mut channels = [None, None];
+        let mut first = None;
+        for (channel, key) in channels.iter_mut().zip(keys) {
+            if let Some(path) = self.file(key) {
+                *channel = Some(Channel { path, number: self.options(key).channel });
+                first = first.or(Some(*key));
+            }
+        }
+        // One image for both that does not say more is one as glTF has it.
+        if let [Some(rough), Some(metal)] = &mut channels
+            && rough == metal
+        {
+            (rough.number, metal.number) = (Some(1), Some(2));
+        }
+        let image = Image { source: ImageSource::Finish(channels), encoding: Encoding::Data, replaces: true };
+        first.map(|key| self.placed(key, image))
+    }
+
+    fn options(&self, key: &str) -> ImageOptions {
+        let text = self.material.unknown_param.get(&format!("{key}_options"));
+        ImageOptions::new(&text.map_or(Vec::new(), |text| text.split_whitespace().collect()))
+    }
+
+    /// `image`, as the options of `key` have it on surfaces.
+    fn placed(&mut self, key: &str, image: Image) -> TextureMap {
+        let options = self.options(key);
+        if let Some(unknown) = options.unknown {
+            self.remark(&format!("{unknown} of {} is not read", spoken(key)));
+        }
+        self.images.push(image);
+        TextureMap { texture: self.images.len() - 1, ..options.map }
+    }
+
+    /// The image file of `key`, if it exists.
+    fn file(&mut self, key: &str) -> Option<PathBuf> {
         let material = self.material;
         let name = match key {
             "map_Kd" => material.diffuse_texture.as_ref(),
@@ -264,17 +344,14 @@ impl Converter<'_> {
         // Exporters for Windows write its separator.
         let path = self.path.parent().unwrap_or(Path::new("")).join(name?.replace('\\', "/"));
         if self.files.exists(&path) {
-            // Exporters write anything for the colour beside an image.
-            let replaces_color = key == "map_Kd";
-            self.images.push(Image { source: ImageSource::File(path), encoding, replaces_color });
-            return Some(TextureMap::of(self.images.len() - 1));
+            return Some(path);
         }
-        let (key, instead) = match key {
-            "map_Kd" => (key, "; the colour is used"),
-            "bump_image" => ("map_Bump", "; left out"),
-            _ => (key, "; left out"),
+        let instead = match key {
+            "map_Kd" => "; the colour is used",
+            "map_Pr" | "map_Pm" => "; the number is used",
+            _ => "; left out",
         };
-        self.remark(&format!("{key} {:?} does not exist{instead}", path.display().to_string()));
+        self.remark(&format!("{} {:?} does not exist{instead}", spoken(key), path.display().to_string()));
         None
     }
 
@@ -302,4 +379,9 @@ impl Converter<'_> {
     fn remark(&mut self, what: &str) {
         self.remarks.push(format!("{}: material {:?}: {what}", self.path.display(), self.material.name));
     }
+}
+
+/// A key as MTL has it.
+fn spoken(key: &str) -> &str {
+    if key == "bump_image" { "map_Bump" } else { key }
 }

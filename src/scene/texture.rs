@@ -8,7 +8,7 @@ use glam::{DVec3, DVec4, Vec3};
 use half::f16;
 
 use super::files::Files;
-use super::mesh_file::{Image, ImageSource};
+use super::mesh_file::{Channel, Image, ImageSource};
 use crate::Result;
 use crate::image::{self, Numbers};
 use crate::optics::spectrum::luminance;
@@ -117,6 +117,32 @@ impl Texture {
         Ok(Self { path: path.into(), width, height, texels })
     }
 
+    /// Roughness as green and metal as blue, each a number of an image or 1, as large as the larger one.
+    fn finish(images: [Option<(Self, Option<usize>)>; 2]) -> Self {
+        let size = |of: fn(&Self) -> u32| images.iter().flatten().map(|(image, _)| of(image)).max().unwrap_or(1);
+        let (width, height) = (size(|image| image.width), size(|image| image.height));
+        let path = images.iter().flatten().next().map_or_else(PathBuf::new, |(image, _)| image.path.clone());
+        let [rough, metal] = images.map(|image| {
+            let (image, number) = image?;
+            let grey = |texel: [f32; 4]| match number {
+                Some(number) => texel[number],
+                None => luminance(Vec3::from_slice(&texel).as_dvec3()) as f32,
+            };
+            let numbers: Vec<_> = image.linear().map(grey).collect();
+            Some((numbers, image.width, image.height))
+        });
+        let at = |image: &Option<(Vec<f32>, u32, u32)>, x: u32, y: u32| {
+            let nearest = |at: u32, from: u32, to: u32| (u64::from(at) * u64::from(to) / u64::from(from)) as usize;
+            let of = |(numbers, w, h): &(Vec<f32>, u32, u32)| {
+                numbers[nearest(y, height, *h) * *w as usize + nearest(x, width, *w)]
+            };
+            f16::from_f32(image.as_ref().map_or(1.0, of))
+        };
+        let texel = |x, y| [f16::ONE, at(&rough, x, y), at(&metal, x, y), f16::ONE];
+        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
+        Self { path, width, height, texels: Texels::Linear(texels) }
+    }
+
     /// Red, green, blue and alpha of each texel, linear.
     pub fn linear(&self) -> Box<dyn Iterator<Item = [f32; 4]> + '_> {
         match &self.texels {
@@ -184,20 +210,28 @@ fn name(path: &Path) -> String {
     path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned()
 }
 
+/// What is read, and how.
+type Key = (Vec<Option<Channel>>, Encoding);
+
 /// The textures so far.
 #[derive(Debug, Default)]
 pub struct Textures {
     /// In the order in which they were named first.
     pub all: Vec<Arc<Texture>>,
-    numbers: HashMap<(PathBuf, Encoding), usize>,
+    numbers: HashMap<Key, usize>,
 }
 
 impl Textures {
     /// The number in [`Textures::all`] of an image, which is read unless it was before.
     pub fn open(&mut self, files: Files, image: &Image, warnings: &mut Vec<String>) -> Result<usize> {
+        let whole = |path| vec![Some(Channel { path, number: None })];
         let identity = match &image.source {
-            ImageSource::File(path) => files.identity(path),
-            ImageSource::Embedded { name, .. } => name.clone(),
+            ImageSource::File(path) => whole(files.identity(path)),
+            ImageSource::Embedded { name, .. } => whole(name.clone()),
+            ImageSource::Finish(channels) => {
+                let identity = |one: &Channel| Channel { path: files.identity(&one.path), number: one.number };
+                channels.iter().map(|one| one.as_ref().map(identity)).collect()
+            }
         };
         let key = (identity, image.encoding);
         if let Some(&number) = self.numbers.get(&key) {
@@ -206,6 +240,15 @@ impl Textures {
         let texture = match &image.source {
             ImageSource::File(path) => Texture::decode(path, &files.read(path)?, image.encoding, warnings)?,
             ImageSource::Embedded { name, bytes } => Texture::decode(name, bytes, image.encoding, warnings)?,
+            ImageSource::Finish(channels) => {
+                let mut read = |one: &Option<Channel>| {
+                    let Some(Channel { path, number }) = one else { return Ok(None) };
+                    Texture::decode(path, &files.read(path)?, image.encoding, warnings)
+                        .map(|image| Some((image, *number)))
+                };
+                let [rough, metal] = channels;
+                Texture::finish([read(rough)?, read(metal)?])
+            }
         };
         self.all.push(Arc::new(texture));
         self.numbers.insert(key, self.all.len() - 1);

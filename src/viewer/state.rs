@@ -47,7 +47,7 @@ pub(super) enum Shows {
     Light,
     /// Interfaces that scattered it.
     Interfaces,
-    /// What `tree` cut off.
+    /// What `tree` and `path` cut off.
     Discarded,
     /// The standard error of `path` and `double`.
     Error,
@@ -70,7 +70,7 @@ impl Shows {
         match self {
             Self::Light => true,
             Self::Interfaces => model != Model::Single,
-            Self::Discarded => model == Model::Tree,
+            Self::Discarded => matches!(model, Model::Tree | Model::Path),
             Self::Error => matches!(model, Model::Path | Model::Double),
         }
     }

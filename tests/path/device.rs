@@ -35,6 +35,7 @@ pub struct Picture {
     pub radiance: Vec<DVec3>,
     pub stderr: Vec<DVec3>,
     pub interfaces: Vec<f64>,
+    pub discarded: Vec<f64>,
 }
 
 fn wide(pixels: &[[f32; 3]]) -> Vec<DVec3> {
@@ -62,7 +63,9 @@ pub fn picture(validated: &Validated, scene: &Scene, shot: Shot) -> Picture {
         "{}: values that are not finite",
         scene.name
     );
-    Picture { radiance, stderr, interfaces: counts.interfaces.into_iter().map(f64::from).collect() }
+    let narrow = |values: Vec<f32>| values.into_iter().map(f64::from).collect();
+    let discarded = counts.discarded.expect("what was cut off");
+    Picture { radiance, stderr, interfaces: narrow(counts.interfaces), discarded: narrow(discarded) }
 }
 
 /// The same of the model `tree`, its throughput followed down to next to nothing.

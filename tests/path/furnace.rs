@@ -24,6 +24,26 @@ fn smooth_bodies_are_white_to_the_bit() {
     validated.verdict();
 }
 
+/// What a picture lacks for being white is what it says it cut off.
+#[test]
+fn what_is_cut_off_is_counted() {
+    let Some(validated) = Validated::open() else { return };
+    for (name, scene) in bodies::all() {
+        let scene = in_white(scene);
+        for depth in [0, 1, 4] {
+            let found = picture(&validated, &scene, Shot { samples: 32, depth, ..Shot::default() });
+            let lost = found.discarded.iter().sum::<f64>() / found.discarded.len() as f64;
+            let pixels = found.radiance.iter().zip(&found.discarded);
+            let worst = pixels.map(|(value, cut)| (*value + *cut - 1.0).abs().max_element()).fold(0.0, f64::max);
+            println!("{name}, depth {depth}: {lost:.1e} cut off, {worst:.1e} not accounted for");
+            // Dispersing glass cuts off light of one colour.
+            assert!(worst < 1e-5 || name.contains("dispers"), "{name}, depth {depth}: {worst:e}");
+            assert!(lost > 1e-3, "{name}, depth {depth}: {lost:e}");
+        }
+    }
+    validated.verdict();
+}
+
 /// Radiance in glass is that of the world times the square of its index.
 #[test]
 fn from_inside_of_glass_the_world_is_brighter() {

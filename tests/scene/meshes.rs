@@ -2,8 +2,8 @@
 
 use std::fs;
 
-use glam::DVec3;
-use vitrum::scene::{Dielectric, Opaque, Overrides, Scene, Surface, TextureMap};
+use glam::{DVec2, DVec3};
+use vitrum::scene::{Dielectric, Opaque, Overrides, Scene, Surface, TextureMap, Wrap};
 
 use super::{Folder, TETRAHEDRON, dielectric, opaque};
 
@@ -244,7 +244,7 @@ fn mtl_values_are_converted_or_remarked_on() {
     assert_eq!(scene.textures[0].path, folder.path("tex/my sky.png"));
     let expected = Opaque {
         base_color: DVec3::ONE,
-        base_color_texture: Some(TextureMap::of(0)),
+        base_color_texture: Some(TextureMap { wrap: [Wrap::Clamp; 2], ..TextureMap::of(0) }),
         metallic: 1.0,
         roughness: 0.25,
         specular: 1.0,
@@ -267,6 +267,85 @@ fn mtl_values_are_converted_or_remarked_on() {
     let (surface, warnings) = from_mtl(&folder, "Kd 2 -1 nan");
     assert!(matches!(surface, Surface::Opaque(opaque) if opaque.base_color == DVec3::X));
     assert_eq!(warnings.len(), 3);
+}
+
+/// Scale and offset of MTL, whose v points upwards.
+#[test]
+fn mtl_places_images() {
+    let folder = Folder::new();
+    let scene = with_mtl(&folder, "map_Kd -s 2 3 1 -o 0.25 -0.5 -blendu on sky.png\nmap_Ke -o -0.125 sky.png");
+    assert_eq!(scene.warnings, Vec::<String>::new());
+    let opaque = opaque(&scene, 0);
+    let at = |map: Option<TextureMap>, u: f64, v: f64| {
+        let map = map.expect("a map");
+        let place = map.turn * DVec2::new(u, 1.0 - v) + map.offset;
+        DVec2::new(place.x, 1.0 - place.y)
+    };
+    for (u, v) in [(0.0, 0.0), (1.0, 0.0), (0.3, 0.7)] {
+        let wanted = DVec2::new(2.0 * u + 0.25, 3.0 * v - 0.5);
+        assert!(at(opaque.base_color_texture, u, v).abs_diff_eq(wanted, 1e-12), "{u} {v}");
+        assert!(at(opaque.emission_texture, u, v).abs_diff_eq(DVec2::new(u - 0.125, v), 1e-12), "{u} {v}");
+    }
+    let scene = with_mtl(&folder, "map_Kd -mm 0.5 2 sky.png");
+    assert!(scene.warnings[0].ends_with("-mm of map_Kd is not read"), "{:?}", scene.warnings);
+}
+
+/// Images of roughness and of metal become one, each in the place of its number.
+#[test]
+fn mtl_images_of_roughness_and_metal_are_one() {
+    let folder = Folder::new();
+    let grey = |name: &str, width: u32, codes: &[u8]| {
+        let image = image::GrayImage::from_raw(width, codes.len() as u32 / width, codes.to_vec()).unwrap();
+        image.save(folder.path(name)).unwrap();
+    };
+    grey("rough.png", 2, &[0, 51]);
+    grey("metal.png", 2, &[255, 102, 0, 204]);
+    image::RgbImage::from_pixel(1, 1, image::Rgb([255, 51, 102])).save(folder.path("both.png")).unwrap();
+    let finish = |lines: &str| {
+        let scene = with_mtl(&folder, &format!("Pr 0.5\nPm 0.25\n{lines}"));
+        let Opaque { roughness, metallic, metallic_roughness_texture, .. } = *opaque(&scene, 0);
+        let texels = metallic_roughness_texture.map(|map| {
+            let texels = scene.textures[map.texture].linear();
+            texels.map(|[_, g, b, _]| [g, b].map(|x| (x * 255.0).round() as u8)).collect::<Vec<_>>()
+        });
+        (roughness, metallic, texels.unwrap_or_default())
+    };
+    assert_eq!(finish("map_Pr rough.png"), (1.0, 0.25, vec![[0, 255], [51, 255]]));
+    assert_eq!(finish("map_Pm metal.png").2, [[255, 255], [255, 102], [255, 0], [255, 204]]);
+    assert_eq!(
+        finish("map_Pr rough.png\nmap_Pm metal.png"),
+        (1.0, 1.0, vec![[0, 255], [51, 102], [0, 0], [51, 204]]),
+        "as large as the larger one"
+    );
+    assert_eq!(finish("map_Pr both.png\nmap_Pm both.png").2, [[51, 102]], "as glTF has it");
+    assert_eq!(finish("map_Pr -imfchan b both.png\nmap_Pm -imfchan r both.png").2, [[102, 255]]);
+    assert_eq!(finish("map_Pr none.png\nmap_Pm rough.png").0, 0.5);
+    fs::write(folder.path("bad.png"), "no image").unwrap();
+    assert_eq!(finish("map_Pr bad.png\nmap_Pm rough.png"), (0.5, 0.25, vec![]));
+    // Glass has it, too.
+    let (surface, _) = from_mtl(&folder, "illum 7\nPr 0.5\nmap_Pr rough.png");
+    let Surface::Dielectric(glass) = surface else { panic!("{surface:?}") };
+    assert_eq!((glass.roughness, glass.metallic_roughness_texture), (1.0, Some(TextureMap::of(0))));
+}
+
+/// What is said of a sheet is of what it is in the end.
+#[test]
+fn open_bodies_are_told_as_what_they_are() {
+    let folder = Folder::new();
+    folder.write("sheet.obj", TETRAHEDRON.replace("f 2 3 4\n", ""));
+    let scene = "[environment]\ncolor = [1, 1, 1]\n[material.m]\nkind = \"dielectric\"\n\
+        [[object]]\nmesh = \"sheet.obj\"\nmaterial = \"m\"\n";
+    folder.write("sheet.toml", scene);
+    let told = |setting: Option<&str>| {
+        let settings = setting.into_iter().map(str::to_owned).collect();
+        let scene =
+            Scene::load(Some(&folder.path("sheet.toml")), &Overrides { settings, ..Overrides::default() }).unwrap();
+        (dielectric(&scene, 0).thin_walled, scene.warnings[0].clone())
+    };
+    let (thin, warning) = told(None);
+    assert!(thin && warning.contains("counts as thin_walled = true"), "{warning}");
+    let (thin, warning) = told(Some("material.m.thin_walled=false"));
+    assert!(!thin && warning.contains("bounds no medium well"), "{warning}");
 }
 
 #[test]

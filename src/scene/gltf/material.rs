@@ -265,7 +265,7 @@ impl<'a> Converter<'a> {
             Ok((number, source)) => {
                 let images = &mut self.images;
                 let texture = *self.numbers.entry((number, encoding)).or_insert_with(|| {
-                    images.push(Image { source, encoding, replaces_color: false });
+                    images.push(Image { source, encoding, replaces: false });
                     images.len() - 1
                 });
                 Some(TextureMap { texture, turn, offset, wrap })

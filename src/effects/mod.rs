@@ -2,12 +2,19 @@
 //!
 //! An effect that is off is compiled out: its bit sets a specialization constant of the shaders.
 
-use std::collections::BTreeSet;
-use std::fmt;
+mod calls;
+mod selection;
+
 use std::str::FromStr;
 
+pub use selection::Selection;
+
 use crate::options::Model;
-use crate::scene::{Coating, Dielectric, Material, Scene, Surface};
+use crate::scene::{Material, Scene, Surface};
+use calls::{
+    absorbs, any_dielectric, coated, cut_out, disperses, glass, lights, mapped, materials, opaque, overlaps, rough,
+    textured, thin_walled,
+};
 
 /// A row of the table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -148,144 +155,6 @@ pub enum Caller {
     Camera(usize),
 }
 
-fn of_glass(surface: &Surface) -> Option<&Dielectric> {
-    match surface {
-        Surface::Dielectric(dielectric) => Some(dielectric),
-        Surface::Opaque(_) => None,
-    }
-}
-
-fn glass(surface: &Surface) -> Option<String> {
-    of_glass(surface).map(|d| format!("glass of index {}", d.ior as f32))
-}
-
-fn rough(surface: &Surface) -> Option<String> {
-    of_glass(surface).filter(|d| d.roughness > SMOOTH).map(|d| format!("roughness {}", d.roughness as f32))
-}
-
-/// A pane has no inside that could.
-fn absorbs(surface: &Surface) -> Option<String> {
-    let dielectric = of_glass(surface)?;
-    let (color, distance) = (dielectric.attenuation_color, dielectric.attenuation_distance);
-    let colored = distance.is_finite() && color.min_element() < 1.0;
-    let [r, g, b] = color.as_vec3().to_array();
-    (colored && !dielectric.thin_walled).then(|| format!("white becomes {r}, {g}, {b} over {} m", distance as f32))
-}
-
-/// Light leaves a pane as it came, each colour in the same direction.
-fn disperses(surface: &Surface) -> Option<String> {
-    let dielectric = of_glass(surface)?;
-    let [blue, red] = [486.1, 656.3].map(|wavelength| dielectric.index_at(wavelength));
-    let spreads = dielectric.disperses() && !dielectric.thin_walled;
-    spreads.then(|| format!("index {red:.4} for red light (656.3 nm), {blue:.4} for blue (486.1 nm)"))
-}
-
-fn thin_walled(surface: &Surface) -> Option<String> {
-    of_glass(surface).filter(|d| d.thin_walled).map(|_| "thin_walled = true".into())
-}
-
-fn opaque(surface: &Surface) -> Option<String> {
-    match surface {
-        Surface::Opaque(opaque) if opaque.emission.max_element() > 0.0 => {
-            Some("lets nothing through, and shines".into())
-        }
-        Surface::Opaque(_) => Some("lets nothing through".into()),
-        Surface::Dielectric(glass) => {
-            let painted = |coating: &Coating| {
-                coating.transmission < 1.0 || coating.transmission_texture.is_some() || coating.metallic > 0.0
-            };
-            glass.coating.as_deref().filter(|coating| painted(coating)).map(|_| "lets nothing through in part".into())
-        }
-    }
-}
-
-/// Maps of normals are an effect of their own, and so is what alpha leaves out.
-fn textured(material: &Material) -> Option<String> {
-    let (color, metallic_roughness, other) = match &material.surface {
-        Surface::Opaque(opaque) => (
-            opaque.base_color_texture,
-            opaque.metallic_roughness_texture,
-            opaque.emission_texture.map(|_| "the emission is an image"),
-        ),
-        Surface::Dielectric(glass) => {
-            let coating = glass.coating.as_deref();
-            (
-                coating.and_then(|coating| coating.base_color_texture),
-                glass.metallic_roughness_texture,
-                coating.and_then(|coating| coating.transmission_texture).map(|_| "the transmission is an image"),
-            )
-        }
-    };
-    let color = color.map(|_| "the base colour is an image");
-    let metallic_roughness = metallic_roughness.map(|_| "roughness and metal are an image");
-    color.or(metallic_roughness).or(other).map(str::to_owned)
-}
-
-fn mapped(material: &Material) -> Option<String> {
-    let bends = material.normal_map.filter(|normal| normal.scale != 0.0);
-    bends.map(|normal| format!("an image bends its normals, with a strength of {}", normal.scale as f32))
-}
-
-fn cut_out(material: &Material) -> Option<String> {
-    let cutout = material.cutout.as_ref()?;
-    Some(match (cutout.map, cutout.cutoff) {
-        (Some(_), Some(cutoff)) => format!("an image leaves out what has an alpha below {}", cutoff as f32),
-        (Some(_), None) => "an image says how much of it is there".into(),
-        (None, _) => format!("its alpha is {}", cutout.alpha as f32),
-    })
-}
-
-fn coated(surface: &Surface) -> Option<String> {
-    let coating = of_glass(surface)?.coating.as_deref()?;
-    let [r, g, b] = coating.base_color.as_vec3().to_array();
-    Some(match coating {
-        Coating { transmission_texture: Some(_), .. } => "an image tells where it lets light through".into(),
-        Coating { base_color_texture: Some(_), .. } => "an image colours what goes through".into(),
-        Coating { transmission, .. } if *transmission < 1.0 => {
-            format!("lets {} of the light through", *transmission as f32)
-        }
-        Coating { metallic, .. } if *metallic > 0.0 => format!("{} of it is metal", *metallic as f32),
-        _ => format!("its surface colours white {r}, {g}, {b}"),
-    })
-}
-
-/// A material that no object wears calls for nothing. Reasons tell numbers as 32 bits hold them: files of meshes do.
-fn materials<'s>(
-    scene: &'s Scene,
-    why: impl Fn(&Material) -> Option<String> + 's,
-) -> impl Iterator<Item = Caller> + 's {
-    let worn: BTreeSet<usize> = scene.objects.iter().map(|object| object.material).collect();
-    worn.into_iter()
-        .filter_map(move |material| why(&scene.materials[material]).map(|why| Caller::Material { material, why }))
-}
-
-fn any_dielectric(scene: &Scene, test: impl Fn(&Dielectric) -> bool) -> bool {
-    let surfaces = scene.objects.iter().map(|object| &scene.materials[object.material].surface);
-    surfaces.filter_map(of_glass).any(test)
-}
-
-fn lights(scene: &Scene) -> impl Iterator<Item = Caller> + '_ {
-    let shines = |light: &usize| !scene.objects.is_empty() && scene.lights[*light].intensity.max_element() > 0.0;
-    (0..scene.lights.len()).filter(shines).map(Caller::Light)
-}
-
-/// Bounding boxes that meet may hold bodies that meet, and a camera in one may be inside the body.
-fn overlaps(scene: &Scene) -> impl Iterator<Item = Caller> + '_ {
-    // A pane has no inside to overlap with.
-    let is_body = |number: &usize| scene.body(&scene.objects[*number]).is_some();
-    let bodies: Vec<usize> = (0..scene.objects.len()).filter(is_body).collect();
-    let boxes: Vec<_> = bodies.iter().map(|&number| scene.bounds_of(&scene.objects[number])).collect();
-    let parts = |&number: &usize| scene.meshes[scene.objects[number].mesh].overlaps;
-    let parts: Vec<_> = bodies.iter().copied().filter(parts).map(Caller::Parts).collect();
-    (0..bodies.len())
-        .flat_map(move |i| {
-            let camera = boxes[i].contains(scene.camera.position).then_some(Caller::Camera(bodies[i]));
-            let pairs = (i + 1..bodies.len()).filter(|&j| boxes[i].intersects(&boxes[j]));
-            camera.into_iter().chain(pairs.map(|j| Caller::Pair(bodies[i], bodies[j]))).collect::<Vec<_>>()
-        })
-        .chain(parts)
-}
-
 impl Effect {
     /// Every effect, in the order of the table.
     pub fn all() -> impl Iterator<Item = Self> {
@@ -312,10 +181,6 @@ impl Effect {
             (Model::Tree, Self::Opaque | Self::DirectLight | Self::Shadows) => true,
             // A mirror lies over what is painted, and what blends is there or not.
             (Model::Tree, Self::Coatings | Self::Cutouts) => true,
-            // There is a table for a roughness, and none for an image of it.
-            (Model::Path, Self::EnergyCompensation) => {
-                any_dielectric(scene, |d| d.metallic_roughness_texture.is_some())
-            }
             (Model::Double, Self::Interior | Self::DirectLight) => true,
             (Model::Double, Self::Roughness) => any_dielectric(scene, |d| d.thin_walled && d.roughness > SMOOTH),
             _ => false,
@@ -386,123 +251,6 @@ impl FromIterator<Effect> for Effects {
     }
 }
 
-/// Which effects a user wants: `auto`, `all` or names; `-name` takes one away. As given, for messages and metadata.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Selection {
-    terms: Vec<Term>,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Term {
-    Auto,
-    All,
-    With(Effect),
-    Without(Effect),
-}
-
-impl Default for Selection {
-    fn default() -> Self {
-        Self { terms: vec![Term::Auto] }
-    }
-}
-
-impl Selection {
-    /// The effects that this selects for `scene`; one that needs another which is not selected is not.
-    pub fn resolve(&self, scene: &Scene) -> Effects {
-        let selected = self.selected(scene);
-        selected.iter().filter(|effect| effect.row().needs.is_none_or(|needed| selected.contains(needed))).collect()
-    }
-
-    /// Whether `effect` is selected or not whatever the scene calls for; `None`: that decides.
-    pub fn wish(&self, effect: Effect) -> Option<bool> {
-        let start = if matches!(self.terms.first(), Some(Term::Without(_))) { None } else { Some(false) };
-        self.terms.iter().fold(start, |wish, &term| match term {
-            Term::Auto => {
-                if wish == Some(true) {
-                    wish
-                } else {
-                    None
-                }
-            }
-            Term::All => Some(true),
-            Term::With(named) => {
-                if named == effect {
-                    Some(true)
-                } else {
-                    wish
-                }
-            }
-            Term::Without(named) => {
-                if named == effect {
-                    Some(false)
-                } else {
-                    wish
-                }
-            }
-        })
-    }
-
-    /// What the scene calls for, but for effects that are wished for or not.
-    pub fn of_wishes(wishes: impl IntoIterator<Item = (Effect, Option<bool>)>) -> Self {
-        let (mut terms, mut without) = (vec![Term::Auto], Vec::new());
-        for (effect, wish) in wishes {
-            match wish {
-                Some(true) => terms.push(Term::With(effect)),
-                Some(false) => without.push(Term::Without(effect)),
-                None => {}
-            }
-        }
-        terms.extend(without);
-        Self { terms }
-    }
-
-    fn selected(&self, scene: &Scene) -> Effects {
-        Effect::all()
-            .filter(|&effect| {
-                // Later terms win; a selection that only takes away starts from what the scene calls for.
-                let start = matches!(self.terms.first(), Some(Term::Without(_))) && effect.called_for_by(scene);
-                self.terms.iter().fold(start, |on, &term| match term {
-                    Term::Auto => on || effect.called_for_by(scene),
-                    Term::All => true,
-                    Term::With(named) => on || named == effect,
-                    Term::Without(named) => on && named != effect,
-                })
-            })
-            .collect()
-    }
-}
-
-impl FromStr for Selection {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let term = |term: &str| match term.trim() {
-            "auto" => Ok(Term::Auto),
-            "all" => Ok(Term::All),
-            name => match name.strip_prefix('-') {
-                Some(name) => name.parse().map(Term::Without),
-                None => name.parse().map(Term::With),
-            },
-        };
-        Ok(Self { terms: text.split(',').map(term).collect::<Result<_, _>>()? })
-    }
-}
-
-impl fmt::Display for Selection {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (i, term) in self.terms.iter().enumerate() {
-            let comma = if i == 0 { "" } else { "," };
-            match term {
-                Term::Auto => write!(f, "{comma}auto"),
-                Term::All => write!(f, "{comma}all"),
-                Term::With(effect) => write!(f, "{comma}{}", effect.name()),
-                Term::Without(effect) => write!(f, "{comma}-{}", effect.name()),
-            }?;
-        }
-        Ok(())
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use std::sync::Arc;
@@ -510,7 +258,7 @@ mod tests {
     use glam::DVec3;
 
     use super::*;
-    use crate::scene::{Dispersion, Glass, Opaque, Overrides, PointLight, TextureMap};
+    use crate::scene::{Dielectric, Dispersion, Glass, Opaque, Overrides, PointLight, TextureMap};
 
     fn built_in() -> Scene {
         Scene::load(None, &Overrides::default()).expect("the built-in scene")
@@ -527,7 +275,7 @@ mod tests {
 
     #[test]
     fn shaders_number_and_name_effects_as_the_table_does() {
-        let text = include_str!("../shaders/effects.glsl");
+        let text = include_str!("../../shaders/effects.glsl");
         let mut found = 0;
         for line in text.lines().filter(|line| line.starts_with("layout(constant_id")) {
             let id: usize = line.split(['=', ')']).nth(1).and_then(|id| id.trim().parse().ok()).expect("an id");
