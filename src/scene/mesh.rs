@@ -10,7 +10,7 @@ use glam::{DAffine3, DVec3, Vec3};
 use serde::Serialize;
 
 use super::Bounds;
-use super::doctor::{Mending, mend};
+use super::doctor::{Mending, close_hairlines, mend};
 use super::smoothing::smooth;
 use super::topology::{self, Topology};
 
@@ -195,7 +195,7 @@ impl fmt::Display for MeshFaults {
 impl Mesh {
     /// A mesh from what a file holds.
     pub fn new(raw: RawMesh) -> Result<Self, Refusal> {
-        let RawMesh { name, positions, normals, uvs, mut triangles } = raw;
+        let RawMesh { name, mut positions, normals, uvs, mut triangles } = raw;
         let mut faults = MeshFaults::default();
         let bad = |position: &[f32; 3]| !position.iter().all(|x| f64::from(x.abs()) <= FARTHEST);
         if let Some(first) = positions.iter().position(bad) {
@@ -206,8 +206,12 @@ impl Mesh {
         if let Some(first) = triangles.iter().position(bad) {
             return Err(Refusal::BadIndices { count: triangles.iter().filter(|t| bad(t)).count(), first, vertices });
         }
-        let Topology { inverted: turned, overlaps, sites, holes } =
-            topology::analyse(&positions, &triangles, &mut faults);
+        let mut topology = topology::analyse(&positions, &triangles, &mut faults);
+        if close_hairlines(&mut positions, &topology.rims) {
+            faults = MeshFaults::default();
+            topology = topology::analyse(&positions, &triangles, &mut faults);
+        }
+        let Topology { inverted: turned, overlaps, sites, holes, .. } = topology;
         let mut inverted = vec![false; if turned.is_empty() { 0 } else { vertices }];
         for number in turned {
             let triangle = &mut triangles[number as usize];
@@ -378,6 +382,38 @@ mod tests {
             .map(|&vertex| TETRAHEDRON[vertex as usize].map(|x| if x == 0.0 { -x } else { x }))
             .collect();
         assert!(faults(&split, &[[0, 1, 2], [3, 4, 5], [6, 7, 8], [9, 10, 11]]).is_empty());
+    }
+
+    /// A ball as programs make them: its last meridian is nearly where its first one is, and so are the vertices at a pole.
+    #[test]
+    fn cracks_of_a_rounding_are_none() {
+        let (around, down) = (16_u32, 8_u32);
+        let ball = |gap: f32| {
+            let mut positions = Vec::new();
+            for row in 0..=down {
+                for column in 0..=around {
+                    let (theta, phi) = (
+                        std::f32::consts::PI * row as f32 / down as f32,
+                        std::f32::consts::TAU * column as f32 / around as f32,
+                    );
+                    let lifted = if column == around { gap } else { 0.0 };
+                    positions.push([theta.sin() * phi.cos(), theta.cos() + lifted, -theta.sin() * phi.sin()]);
+                }
+            }
+            let mut triangles = Vec::new();
+            for row in 0..down {
+                for a in row * (around + 1)..row * (around + 1) + around {
+                    let (b, c, d) = (a + 1, a + around + 1, a + around + 2);
+                    triangles.extend((row > 0).then_some([a, d, b]));
+                    triangles.extend((row + 1 < down).then_some([a, c, d]));
+                }
+            }
+            faults(&positions, &triangles)
+        };
+        let unused = MeshFaults { unused_vertices: 2, ..MeshFaults::default() };
+        assert_eq!(ball(0.0), unused);
+        let torn = ball(1e-5);
+        assert!(torn.open_edges >= 2 * down as usize - 2, "{torn}");
     }
 
     #[test]

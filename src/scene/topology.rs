@@ -41,6 +41,8 @@ pub struct Topology {
     pub sites: FaultSites,
     /// The area of its holes, over its own.
     pub holes: f64,
+    /// The vertices of its open edges, welded.
+    pub rims: Vec<u32>,
 }
 
 /// Adds open, non-manifold and inconsistent edges and inverted shells to `faults`.
@@ -55,6 +57,7 @@ pub fn analyse(positions: &[[f32; 3]], triangles: &[[u32; 3]], faults: &mut Mesh
         overlaps: overlaps(&shells, &inverted),
         sites,
         holes: holes(positions, triangles, &open),
+        rims: open.into_flattened(),
         inverted: inverted.into_iter().flat_map(|shell| shell.numbers.iter().copied()).collect(),
     }
 }

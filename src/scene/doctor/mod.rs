@@ -16,7 +16,7 @@ use glam::{DAffine3, DVec3};
 use serde::Serialize;
 
 pub use nesting::{Nest, Nesting};
-pub use repair::{Mending, mend};
+pub use repair::{Mending, close_hairlines, mend};
 
 use super::topology::weld;
 use super::walls::Walls;

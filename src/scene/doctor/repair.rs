@@ -73,15 +73,38 @@ pub fn mend(raw: &mut RawMesh) -> Mending {
     Mending { welded, duplicates, turned }
 }
 
+/// Closes cracks that are only a rounding wide among vertices on the rims of a surface, as a seam has whose angle comes around to
+/// 2 pi: nothing of a mesh that is to be seen. Whether there were any.
+pub fn close_hairlines(positions: &mut [[f32; 3]], rims: &[u32]) -> bool {
+    if rims.is_empty() {
+        return false;
+    }
+    let mut is_on_rim = vec![false; positions.len()];
+    rims.iter().for_each(|&vertex| is_on_rim[vertex as usize] = true);
+    let near = roundings(bounds_of(positions));
+    weld_near(positions, near, |vertex| is_on_rim[vertex as usize]) > 0
+}
+
 /// Moves vertices to the first one that is near enough; counts the places that were left.
 fn close_cracks(positions: &mut [[f32; 3]]) -> usize {
-    let first = weld(positions);
-    let corners = (0..positions.len() as u32).map(|vertex| place(positions, vertex));
-    let bounds = Bounds::around(corners);
-    let near = (NEAR * bounds.extent().max_element()).max(2.0 * f64::from(f32::EPSILON) * bounds.reach());
+    let bounds = bounds_of(positions);
+    weld_near(positions, (NEAR * bounds.extent().max_element()).max(roundings(bounds)), |_| true)
+}
+
+fn bounds_of(positions: &[[f32; 3]]) -> Bounds {
+    Bounds::around((0..positions.len() as u32).map(|vertex| place(positions, vertex)))
+}
+
+/// Two of the largest coordinate to 32 bits.
+fn roundings(bounds: Bounds) -> f64 {
+    2.0 * f64::from(f32::EPSILON) * bounds.reach()
+}
+
+fn weld_near(positions: &mut [[f32; 3]], near: f64, is_meant: impl Fn(u32) -> bool) -> usize {
     if !(near > 0.0 && near.is_finite()) {
         return 0;
     }
+    let first = weld(positions);
     let cell = |point: DVec3| (point / (CELL * near)).floor().as_i64vec3();
     let mut cells: HashMap<glam::I64Vec3, Vec<u32>> = HashMap::new();
     let mut target: Vec<u32> = (0..positions.len() as u32).collect();
@@ -89,6 +112,9 @@ fn close_cracks(positions: &mut [[f32; 3]]) -> usize {
     for vertex in 0..positions.len() as u32 {
         if first[vertex as usize] != vertex {
             target[vertex as usize] = target[first[vertex as usize] as usize];
+            continue;
+        }
+        if !is_meant(vertex) {
             continue;
         }
         let point = place(positions, vertex);
