@@ -172,6 +172,7 @@ impl Scene {
         let camera = camera.unwrap_or_else(|| Camera::framing(assembly.bounds(), 1.0));
         let mut files = assembly.files();
         let Assembly { meshes, mut objects, mut materials, textures, decided, mut warnings, .. } = assembly;
+        files.extend(textures.files);
         let textures = textures.all;
         for material in &mut materials {
             // Most files that blend have nothing to blend.
@@ -193,7 +194,6 @@ impl Scene {
             }
         }
         let EnvironmentTable { light, intensity, rotation, visible } = environment;
-        files.extend(textures.iter().map(|texture| texture.path.clone()));
         let light = match overrides.environment.map_or(light, |path| Light::Image(Files::Disk, path)) {
             Light::Image(from, path) => {
                 let panorama = Panorama::read(from, &path, &mut warnings)?;

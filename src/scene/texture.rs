@@ -218,6 +218,8 @@ type Key = (Vec<Option<Channel>>, Encoding);
 pub struct Textures {
     /// In the order in which they were named first.
     pub all: Vec<Arc<Texture>>,
+    /// The files that were read.
+    pub files: Vec<PathBuf>,
     numbers: HashMap<Key, usize>,
 }
 
@@ -237,17 +239,20 @@ impl Textures {
         if let Some(&number) = self.numbers.get(&key) {
             return Ok(number);
         }
+        let mut read = |path: &Path| -> Result<Texture> {
+            let texture = Texture::decode(path, &files.read(path)?, image.encoding, warnings)?;
+            self.files.push(path.into());
+            Ok(texture)
+        };
         let texture = match &image.source {
-            ImageSource::File(path) => Texture::decode(path, &files.read(path)?, image.encoding, warnings)?,
+            ImageSource::File(path) => read(path)?,
             ImageSource::Embedded { name, bytes } => Texture::decode(name, bytes, image.encoding, warnings)?,
-            ImageSource::Finish(channels) => {
-                let mut read = |one: &Option<Channel>| {
-                    let Some(Channel { path, number }) = one else { return Ok(None) };
-                    Texture::decode(path, &files.read(path)?, image.encoding, warnings)
-                        .map(|image| Some((image, *number)))
+            ImageSource::Finish([rough, metal]) => {
+                let mut channel = |one: &Option<Channel>| match one {
+                    Some(Channel { path, number }) => read(path).map(|image| Some((image, *number))),
+                    None => Ok(None),
                 };
-                let [rough, metal] = channels;
-                Texture::finish([read(rough)?, read(metal)?])
+                Texture::finish([channel(rough)?, channel(metal)?])
             }
         };
         self.all.push(Arc::new(texture));

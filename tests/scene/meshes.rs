@@ -312,6 +312,8 @@ fn mtl_images_of_roughness_and_metal_are_one() {
     };
     assert_eq!(finish("map_Pr rough.png"), (1.0, 0.25, vec![[0, 255], [51, 255]]));
     assert_eq!(finish("map_Pm metal.png").2, [[255, 255], [255, 102], [255, 0], [255, 204]]);
+    let files = with_mtl(&folder, "map_Pr rough.png\nmap_Pm metal.png").files;
+    assert!(["rough.png", "metal.png"].iter().all(|name| files.contains(&folder.path(name))), "{files:?}");
     assert_eq!(
         finish("map_Pr rough.png\nmap_Pm metal.png"),
         (1.0, 1.0, vec![[0, 255], [51, 102], [0, 0], [51, 204]]),
