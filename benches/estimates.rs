@@ -1,6 +1,6 @@
 //! What `--tolerance` promises, held against the true error on ten scenes: `cargo bench --bench estimates` prints the table of
 //! docs/auto.md. Arguments choose tolerances, and scenes by their names or a part of them, as
-//! `-- 0.1 0.01 ball`; without any it takes all of them, which is hours. Another one, as `8x6`, is the size of the pictures.
+//! `-- 0.1 0.01 ball`; without any it takes all of them, which is hours. One as `8x6` is the size of what `path` and `auto` render.
 //!
 //! What is counted are the pixels, each channel for itself, whose |x - r| / (r + 0.1) is below the tolerance. `tree` promises what it
 //! cuts off: r is the same samples followed on and on. `path` promises what its samples scatter: r is another picture of it, and the

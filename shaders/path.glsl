@@ -168,7 +168,7 @@ void main()
     vec3 sum = vec3(0.0);
     uint interfaces = 0;
     uint rays = 0;
-    float discarded = 0.0;
+    vec3 discarded = vec3(0.0);
 
     Whereabouts atCamera = Whereabouts(frame.cameraMedium, Bodies(frame.cameraBodies));
     Ray path = Ray(vec3(0.0), vec3(0.0, 0.0, -1.0), vec3(0.0), LARGEST_FLOAT, atCamera, NOWHERE, NOWHERE, 0);
@@ -294,6 +294,7 @@ void main()
             path = ray;
             travelled += arrival.distance;
             goesOn = !ends;
+            if (ends) discarded += max(ray.throughput, vec3(0.0));
         } else {
             if (isOpaque && Largest(material.emission) > 0.0) {
                 float weight = 1.0;
@@ -304,7 +305,7 @@ void main()
                 sum += weight * ray.throughput * material.emission / (crossing.etaI * crossing.etaI);
             }
             goesOn = depth < frame.maxDepth;
-            if (!goesOn) discarded += Largest(ray.throughput);
+            if (!goesOn) discarded += max(ray.throughput, vec3(0.0));
         }
 
         bool scatters = !isLight && meets && !passes;
@@ -399,7 +400,7 @@ void main()
     }
     float samples = float(samplesInBatch);
     float scale = frame.cameraIndex * frame.cameraIndex;
-    AddBatch(place, scale * sum / samples, vec3(interfaces, rays, discarded) / samples);
+    AddBatch(place, scale * sum / samples, vec3(interfaces, rays, scale * Largest(discarded)) / samples);
 }
 
 #endif

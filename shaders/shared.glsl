@@ -80,9 +80,9 @@ struct Material {
 
 struct Light {
     vec3 position;
-    float coneScale;           // of a spot, whose strength is a cosine times this plus the next, squared; 0: shines everywhere
+    float coneScale;           // how strong it is, squared: the cosine with its axis times this plus coneOffset, 0 to 1
     vec3 intensity;            // W/sr, of a spot along its axis
-    float coneOffset;
+    float coneOffset;          // 1, with a scale of 0: everywhere alike
     vec3 axis;                 // of a spot, the direction of its light
 };
 

@@ -6,7 +6,7 @@ use std::time::Duration;
 
 use crate::effects::{Effect, Effects, SMOOTH};
 use crate::options::{Aov, DebugControls, MOST_SAMPLES, Model, ModelChoice, RenderArgs, Size, Tonemap, Trace};
-use crate::scene::{Scene, Surface};
+use crate::scene::{Scene, Surface, TextureMap};
 use crate::{Error, Result};
 
 /// A render, decided.
@@ -122,21 +122,24 @@ impl Model {
 const POINT_THROUGH_GLASS: &str = "light of point lights through smooth glass, and their images in smooth surfaces";
 
 fn unseen(scene: &Scene, model: Model, effects: Effects) -> Vec<&'static str> {
-    let as_smooth = |roughness: f64| roughness <= SMOOTH || !effects.contains(Effect::Roughness);
+    // An image may be smooth in places.
+    let least = |roughness: f64, map: Option<TextureMap>| {
+        roughness * map.map_or(1.0, |map| scene.textures[map.texture].least_green())
+    };
     let is_smooth = |surface: &Surface| match surface {
-        // An image may be smooth in places.
         Surface::Dielectric(glass) => {
-            (as_smooth(glass.roughness) || glass.metallic_roughness_texture.is_some()) && glass.ior != 1.0
+            let is_rough = || least(glass.roughness, glass.metallic_roughness_texture) > SMOOTH;
+            glass.ior != 1.0 && !(effects.contains(Effect::Roughness) && is_rough())
         }
         Surface::Opaque(opaque) => {
-            let is_smooth = opaque.roughness <= SMOOTH || opaque.metallic_roughness_texture.is_some();
-            let mirrors = is_smooth && opaque.specular.max(opaque.metallic) > 0.0;
+            let mirrors = || least(opaque.roughness, opaque.metallic_roughness_texture) <= SMOOTH;
+            let mirrors = opaque.specular.max(opaque.metallic) > 0.0 && mirrors();
             mirrors && effects.contains(Effect::Opaque)
         }
     };
-    let any_smooth = scene.objects.iter().any(|object| is_smooth(&scene.materials[object.material].surface));
+    let any_smooth = || scene.objects.iter().any(|object| is_smooth(&scene.materials[object.material].surface));
     let lit = effects.contains(Effect::DirectLight) && Effect::DirectLight.called_for_by(scene);
-    if model == Model::Path && lit && any_smooth { vec![POINT_THROUGH_GLASS] } else { Vec::new() }
+    if model == Model::Path && lit && any_smooth() { vec![POINT_THROUGH_GLASS] } else { Vec::new() }
 }
 
 impl Plan {

@@ -214,7 +214,9 @@ const MTL: &str = "newmtl glass\nillum 7\nNi 1.5\nd 0.5\nTr 0.5\nTf 1 0.9 0.8\nP
 const TOML: &str = "[environment]\ncolor = [1, 1, 1]\nintensity = 1.0\nrotation = 0.0\nvisible = true\n\n[camera]\n\
     position = [0.0, 0.25, 0.9]\ntarget = [0.0, 0.1, 0.0]\nup = [0.0, 1.0, 0.0]\nvertical_fov = 35.0\n\n[render]\n\
     size = [1024, 768]\nsamples = 4\nmodel = \"tree\"\neffects = \"auto,-nesting\"\naov = [\"normal\", \"depth\"]\n\n\
-    [[light]]\nkind = \"point\"\nposition = [1.0, 2.0, 1.0]\nintensity = [10, 10, 10]\n\n[material.glass]\n\
+    [[light]]\nkind = \"point\"\nposition = [1.0, 2.0, 1.0]\nintensity = [10, 10, 10]\n\n[[light]]\nkind = \"spot\"\n\
+    position = [1, 2, 1]\nintensity = [1, 2, 3]\ndirection = [0, -1, 0.5]\ninner_cone_angle = 10\nouter_cone_angle = 20.5\n\n\
+    [[light]]\nkind = \"directional\"\ndirection = [0, -1, 0]\nirradiance = [3, 2, 1]\n\n[material.glass]\n\
     kind = \"dielectric\"\nior = \"bk7\"\nroughness = 0.01\ndispersion = 0.0\nattenuation_color = [1, 1, 1]\n\
     attenuation_distance = inf\nthin_walled = false\npriority = 0\n\n[material.table]\nkind = \"opaque\"\n\
     base_color = [0.8, 0.8, 0.8]\nmetallic = 0.0\nroughness = 1.0\nspecular = 1.0\nemission = [0, 0, 0]\n\n[[object]]\n\
@@ -277,6 +279,9 @@ fn check(scene: &Scene) {
     }
     for material in &scene.materials {
         assert!(material.maps().iter().all(|map| map.texture < scene.textures.len()));
+    }
+    for light in &scene.lights {
+        assert!(light.position.is_finite() && light.intensity.is_finite() && light.intensity.min_element() >= 0.0);
     }
     for texture in &scene.textures {
         let Texture { width, height, texels, .. } = texture.as_ref();
@@ -345,12 +350,15 @@ fn model() -> gltf::Model {
     let positions = model.push("accessors", sparse);
     let strip = model.mesh(&[json!({ "attributes": { "POSITION": positions }, "mode": 5 })]);
     model.push("cameras", json!({ "type": "perspective", "perspective": { "yfov": 0.6, "znear": 0.1 } }));
-    model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 8 }] } });
+    model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "point", "intensity": 8 },
+        { "type": "spot", "spot": { "innerConeAngle": 0.1, "outerConeAngle": 0.5 } }, { "type": "directional" }] } });
     let inner =
         model.push("nodes", json!({ "mesh": mesh, "matrix": [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1] }));
     model.node(json!({ "children": [inner], "translation": [1, 0, 0], "rotation": [0, 0, 0, 1], "scale": [1, 2, 1] }));
     model.node(json!({ "camera": 0, "translation": [0, 0, 5] }));
-    model.node(json!({ "mesh": strip, "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+    for light in 0..3 {
+        model.node(json!({ "mesh": strip, "extensions": { "KHR_lights_punctual": { "light": light } } }));
+    }
     model
 }
 

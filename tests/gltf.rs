@@ -564,6 +564,24 @@ fn what_is_not_supported_is_named_once() {
     }
 }
 
+/// A cone with a hard edge is one, as programs write it that know no soft one; angles that are none are told.
+#[test]
+fn cones_of_spots_are_taken_or_told() {
+    let with = |spot: Value, scale: f64| {
+        let mut model = Model::of(&icosphere(1), None);
+        model.json["extensions"] = json!({ "KHR_lights_punctual": { "lights": [{ "type": "spot", "spot": spot }] } });
+        model.node(json!({ "scale": [scale, scale, scale], "extensions": { "KHR_lights_punctual": { "light": 0 } } }));
+        let scene = loaded(&model);
+        (scene.lights.len(), scene.warnings.join("\n"))
+    };
+    assert_eq!(with(json!({ "innerConeAngle": 1.0471976, "outerConeAngle": 1.0471976 }), 1.0), (1, String::new()));
+    assert_eq!(with(json!({}), 1.0), (1, String::new()));
+    let (count, said) = with(json!({ "innerConeAngle": 0.9 }), 1.0);
+    assert!(count == 0 && said.contains("light 0: its angles 0.9 and 0.7853982 are not"), "{said}");
+    let (count, said) = with(json!({}), 0.0);
+    assert!(count == 0 && said.contains("light 0: its node is scaled to nothing"), "{said}");
+}
+
 #[test]
 fn faults_are_told_with_their_place() {
     let ball = || Model::of(&icosphere(1), None);

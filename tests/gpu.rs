@@ -121,7 +121,14 @@ impl Records {
                 transmission: n.next(),
                 ..MaterialRecord::zeroed()
             },
-            light: LightRecord { position: n.vector(), intensity: n.vector(), ..LightRecord::zeroed() },
+            light: LightRecord {
+                position: n.vector(),
+                cone_scale: n.next(),
+                intensity: n.vector(),
+                cone_offset: n.next(),
+                axis: n.vector(),
+                ..LightRecord::zeroed()
+            },
             position: n.next(),
             normal: n.next(),
             triangle: n.next() as u32,

@@ -15,12 +15,11 @@ use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use crate::Result;
 use crate::gpu::Gpu;
 use crate::options::{MOST_SAMPLES, Model, RenderArgs};
 use crate::passes;
-use crate::plan::Plan;
 use crate::scene::Scene;
-use crate::{Error, Result};
 use law::Law;
 use pilots::{MORE, Pilots};
 pub use pilots::{error_of_most, pilot_size};
@@ -160,13 +159,6 @@ impl Measurements {
 const NO_TIME: &str = "there is no time to try";
 const NO_TRUTH: &str = "nothing tells how far off a model is";
 
-/// `args`, whose model is to be chosen, with one that takes them.
-pub fn with_any_model(scene: &Scene, args: &RenderArgs) -> Result<RenderArgs> {
-    let with = |model: Model| RenderArgs { model: Some(model.into()), ..args.clone() };
-    let takes = |model: &Model| Plan::new(scene, &with(*model)).is_ok();
-    [Model::Path, Model::Tree, Model::Double, Model::Single].into_iter().find(takes).map(with).ok_or_else(no_model)
-}
-
 /// What each law comes to for what is asked, the best first, and whether that keeps it.
 fn ranked(laws: &[(RenderArgs, Model, Law)], args: &RenderArgs, goal: Goal, taken: Duration) -> (Vec<Candidate>, bool) {
     let most = args.samples.unwrap_or(MOST_SAMPLES);
@@ -203,11 +195,4 @@ fn ranked(laws: &[(RenderArgs, Model, Law)], args: &RenderArgs, goal: Goal, take
     });
     let is_expected = all.first().is_some_and(keeps);
     (all, is_expected)
-}
-
-/// No model takes the options that are given.
-fn no_model() -> Error {
-    Error::Usage(
-        "--model auto: no model takes these options together; leave --aov or --checkpoint out, or name a model".into(),
-    )
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use super::law::{FEW, Law, Spread};
-use super::{Candidate, Goal, no_model};
+use super::{Candidate, Goal};
 use crate::Result;
 use crate::cost::mean;
 use crate::gpu::{DeviceKind, Gpu};
@@ -154,7 +154,16 @@ impl<'a> Pilots<'a> {
         let plans = [Model::Tree, Model::Path, Model::Double, Model::Single].into_iter().filter_map(options);
         let plans: Vec<_> =
             plans.filter_map(|args| Plan::new(self.scene, &args).ok().map(|plan| (args, plan))).collect();
-        let (args, plan) = plans.into_iter().min_by_key(|(_, plan)| plan.lacks()).ok_or_else(no_model)?;
+        let best = plans.into_iter().min_by_key(|(_, plan)| plan.lacks());
+        // `path` takes all options, unless they are wrong for every model.
+        let (args, plan) = match best {
+            Some(best) => best,
+            None => {
+                let args = RenderArgs { model: Some(Model::Path.into()), ..self.args.clone() };
+                let plan = Plan::new(self.scene, &args)?;
+                (args, plan)
+            }
+        };
         let samples = self.args.samples.unwrap_or(MORE);
         Ok(Candidate { args, model: plan.model, samples, ms: f64::NAN, error: f64::NAN, lacks: plan.lacks() })
     }

@@ -7,7 +7,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 
 use super::{Talk, devices, print};
-use crate::choice::{Choice, choose, with_any_model};
+use crate::choice::{Choice, choose};
 use crate::gpu::{Gpu, Instance, complaint};
 use crate::image::{ImageFormat, OutputFile, encode_exr, encode_png};
 use crate::options::{MOST_DEPTH, Model, ModelChoice, RenderArgs};
@@ -83,7 +83,9 @@ impl RenderCommand {
         }
         if plan.unsupported != Default::default() {
             let (model, names) = (plan.model.name(), plan.unsupported.names().join(", "));
-            talk.note(&format!("note: model {model} does not simulate {names}"));
+            let all_of_path = plan.unsupported.iter().all(|effect| effect.honoured_by(Model::Path));
+            let other = if all_of_path { "; --model path does" } else { "" };
+            talk.note(&format!("note: model {model} does not simulate {names}{other}"));
         }
         if plan.approximate != Default::default() {
             let (model, names) = (plan.model.name(), plan.approximate.names().join(", "));
@@ -161,9 +163,9 @@ impl RenderCommand {
             }
             Ok(plan)
         };
-        // Which model it will be is not known yet: what no model takes is refused.
+        // Which model it will be is not known yet: what `path` does not take none does.
         let plan = |options: &RenderArgs| match options.model {
-            Some(ModelChoice::Auto) => plan(&with_any_model(scene, options)?),
+            Some(ModelChoice::Auto) => plan(&RenderArgs { model: Some(Model::Path.into()), ..options.clone() }),
             _ => plan(options),
         };
         plan(&self.options.clone().or(scene.render.clone())).map_err(|error| match (plan(&self.options), &self.scene) {
@@ -239,6 +241,9 @@ fn cut_off(plan: &Plan, stats: &Stats) -> Option<String> {
     const SEEN: f32 = 0.05;
     let (most, depth) = (stats.discarded?.max, plan.max_depth?);
     let promised = plan.options.tolerance.map_or(SEEN, |tolerance| tolerance as f32);
+    // A few paths are no measure.
+    let few = if plan.model == Model::Path { 4.0 / stats.samples as f32 } else { 0.0 };
+    let promised = promised.max(few);
     (most > promised).then(|| {
         let mean = stats.discarded.map_or(0.0, |discarded| discarded.mean);
         let advice = match plan.options.tolerance {

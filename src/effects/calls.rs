@@ -17,7 +17,10 @@ pub(super) fn glass(surface: &Surface) -> Option<String> {
 }
 
 pub(super) fn rough(surface: &Surface) -> Option<String> {
-    of_glass(surface).filter(|d| d.roughness > SMOOTH).map(|d| format!("roughness {}", d.roughness as f32))
+    of_glass(surface).filter(|d| d.roughness > SMOOTH).map(|d| match d.metallic_roughness_texture {
+        Some(_) => format!("an image tells its roughness, up to {}", d.roughness as f32),
+        None => format!("roughness {}", d.roughness as f32),
+    })
 }
 
 /// A pane has no inside that could.

@@ -9,6 +9,7 @@ use std::str::FromStr;
 
 pub use selection::Selection;
 
+pub use crate::optics::rough::SMOOTH;
 use crate::options::Model;
 use crate::scene::{Material, Scene, Surface};
 use calls::{
@@ -53,9 +54,6 @@ pub enum Effect {
     /// Glass that is coloured or painted at its surface
     Coatings,
 }
-
-/// The highest roughness that still counts as smooth: the original's default.
-pub const SMOOTH: f64 = 0.01;
 
 struct Row {
     effect: Effect,

@@ -129,7 +129,7 @@ impl MaterialRecord {
     pub const OPAQUE: u32 = 2;
 }
 
-/// `Light`: a point light.
+/// `Light`: a light without extent.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq, Pod, Zeroable)]
 #[expect(missing_docs, reason = "shared.glsl describes the members")]

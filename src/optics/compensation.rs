@@ -4,8 +4,7 @@
 //! "Practical multiple scattering compensation for microfacet models" (2019), scales the BSDF by 1 / E, E being the share that
 //! leaves the surface after one bounce when light comes at the given angle: surroundings of radiance 1 then show radiance 1.
 
-use super::rough::RoughInterface;
-use crate::effects::SMOOTH;
+use super::rough::{RoughInterface, SMOOTH};
 use crate::parallel;
 
 /// E by the cosine of incidence, for one interface and side: nodes at cosines (i / (NODES - 1))^3, dense where light grazes the
@@ -80,11 +79,26 @@ mod tests {
         assert!(threshold.contains(&format!("const float SMOOTH_ROUGHNESS = {SMOOTH};")));
     }
 
+    /// The two tables that the shader looks up for a roughness, by its own arithmetic, are those on both sides of it.
+    #[test]
+    fn shaders_find_the_levels_of_a_roughness() {
+        let smooth = SMOOTH as f32;
+        for i in 0..=100_000 {
+            let roughness = smooth + (1.0 - smooth) * i as f32 / 100_000.0;
+            let share = ((roughness - smooth) / (1.0 - smooth)).clamp(0.0, 1.0);
+            let level = share.powf(2.0 / 3.0) * (LEVELS - 1) as f32;
+            let low = (level as usize).min(LEVELS - 2);
+            let [below, above] = [low, low + 1].map(|level| roughness_of_level(level as f64));
+            let roughness = f64::from(roughness);
+            assert!(below <= roughness * (1.0 + 1e-5) && roughness <= above * (1.0 + 1e-5), "{roughness}: {low}");
+        }
+    }
+
     /// What an image of the roughness takes from the levels on its sides is right within 2 %.
     #[test]
     fn levels_of_roughness_are_close_enough() {
         let mut worst = (0.0, String::new());
-        for (eta_i, eta_t) in [(1.0, 1.5), (1.5, 1.0), (2.42, 1.0), (1.0, 1e12)] {
+        for (eta_i, eta_t) in [(1.0, 1.1), (1.1, 1.0), (1.0, 1.5), (1.5, 1.0), (1.0, 2.42), (2.42, 1.0), (1.0, 1e12)] {
             let table =
                 |roughness: f64| AlbedoTable::new(RoughInterface { alpha: roughness * roughness, eta_i, eta_t });
             let mut low = table(roughness_of_level(0.0));

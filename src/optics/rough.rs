@@ -9,6 +9,9 @@ use super::microfacet::{masking_ggx, sample_visible_normal, sin_squared, visible
 /// Below this alpha, and between equal indices, an interface is smooth.
 pub const LEAST_ALPHA: f64 = 1e-10;
 
+/// The highest roughness that still counts as smooth: the original's default.
+pub const SMOOTH: f64 = 0.01;
+
 /// A surface's alpha and the indices on its two sides.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RoughInterface {

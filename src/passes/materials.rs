@@ -22,59 +22,69 @@ use crate::scene::{Dielectric, Dispersion, Material, Opaque, Scene, Sellmeier, S
 /// An index so high that an interface reflects everything.
 const MIRROR: f64 = 1e12;
 
-/// Tables of what single bounces between facets lose, each interface's once: `shaders/compensation.glsl`.
+/// Tables of what single bounces between facets lose, each once: `shaders/compensation.glsl`.
 struct Albedos {
     /// Nothing stands at 0, which says that there is no table.
     values: Vec<f32>,
-    tables: Vec<(Facets, f64, f64, u32)>,
+    tables: Vec<(Interface, u32)>,
+    made: Vec<(RoughInterface, Arc<AlbedoTable>)>,
 }
 
-/// How rough a surface is.
+/// Where light is scattered, as tables have it.
 #[derive(Clone, Copy, PartialEq)]
-enum Facets {
-    /// By a number.
-    Alpha(f64),
-    /// By an image that is nowhere rougher than this.
-    UpTo(f64),
+struct Interface {
+    roughness: f64,
+    /// The roughness is the highest one of an image.
+    is_mapped: bool,
+    eta_i: f64,
+    eta_t: f64,
 }
 
-impl Facets {
-    /// Alpha of each table.
-    fn alphas(self) -> Vec<f64> {
-        match self {
-            Self::Alpha(alpha) => vec![alpha],
-            // Levels above are never looked up, but for the one that the roughest texel lies below.
-            Self::UpTo(most) => {
-                let levels = (0..LEVELS).map(|level| roughness_of_level(level as f64));
-                let first_above = levels.clone().position(|roughness| roughness >= most).unwrap_or(LEVELS - 1);
-                levels.take(first_above.max(1) + 1).map(|roughness| roughness * roughness).collect()
-            }
+impl Interface {
+    /// The roughness of each table, one after the other.
+    fn roughnesses(&self) -> Vec<f64> {
+        if !self.is_mapped {
+            return vec![self.roughness];
         }
+        let levels = (0..LEVELS).map(|level| roughness_of_level(level as f64));
+        // Levels above are never looked up, but for the one that the roughest texel lies below, as 32 bits have it.
+        let above = levels.clone().position(|level| level > self.roughness * (1.0 + 1e-4));
+        levels.take(above.unwrap_or(LEVELS).max(1) + 1).collect()
     }
 }
 
 impl Albedos {
     /// The first node of the tables of an interface.
-    fn table(&mut self, facets: Facets, eta_i: f64, eta_t: f64) -> u32 {
-        let known = self.tables.iter().find(|(a, b, c, _)| (*a, *b, *c) == (facets, eta_i, eta_t));
-        if let Some(&(.., first)) = known {
+    fn table(&mut self, interface: Interface) -> u32 {
+        if let Some(&(_, first)) = self.tables.iter().find(|(other, _)| *other == interface) {
             return first;
         }
         let first = self.values.len() as u32;
-        for alpha in facets.alphas() {
-            let table = AlbedoTable::new(RoughInterface { alpha, eta_i, eta_t });
+        for roughness in interface.roughnesses() {
+            let Interface { eta_i, eta_t, .. } = interface;
+            let table = self.made(RoughInterface { alpha: roughness * roughness, eta_i, eta_t });
             self.values.extend(table.nodes().iter().map(|&albedo| albedo as f32));
         }
-        self.tables.push((facets, eta_i, eta_t, first));
+        self.tables.push((interface, first));
         first
     }
 
+    /// Images of several materials share levels.
+    fn made(&mut self, interface: RoughInterface) -> Arc<AlbedoTable> {
+        if let Some((_, table)) = self.made.iter().find(|(other, _)| *other == interface) {
+            return table.clone();
+        }
+        let table = Arc::new(AlbedoTable::new(interface));
+        self.made.push((interface, table.clone()));
+        table
+    }
+
     /// Where the tables of all pairs are listed that `ior` makes with `others`, from either side.
-    fn pairs(&mut self, facets: Facets, ior: f64, others: &[f64]) -> u32 {
+    fn pairs(&mut self, surface: Interface, ior: f64, others: &[f64]) -> u32 {
         let mut list = Vec::new();
         for &other in others.iter().filter(|&&other| other != ior) {
             for (eta_i, eta_t) in [(other, ior), (ior, other)] {
-                let first = self.table(facets, eta_i, eta_t);
+                let first = self.table(Interface { eta_i, eta_t, ..surface });
                 list.extend([eta_i as f32, eta_t as f32, first as f32]);
             }
         }
@@ -105,7 +115,7 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View, maps: &Maps) ->
     // Of what nobody sees means are not worth their time: images are large.
     let of_opaque = Means { scene, looks: means.looks || !plan.effects.contains(Effect::Opaque) };
     let of_coatings = Means { scene, looks: means.looks || !plan.effects.contains(Effect::Coatings) };
-    let mut albedos = Albedos { values: vec![0.0], tables: Vec::new() };
+    let mut albedos = Albedos { values: vec![0.0], tables: Vec::new(), made: Vec::new() };
     let others = indices(scene, plan);
     let record = |material: &Material| {
         let glass = match &material.surface {
@@ -121,15 +131,15 @@ pub(super) fn materials(scene: &Scene, plan: &Plan, view: &View, maps: &Maps) ->
         let is_mapped = means.looks && glass.metallic_roughness_texture.is_some();
         let loses = is_rough(material) || sees_media && roughness > SMOOTH;
         if plan.effects.contains(Effect::EnergyCompensation) && loses {
-            let facets = if is_mapped { Facets::UpTo(roughness) } else { Facets::Alpha(roughness * roughness) };
+            let surface = Interface { roughness, is_mapped, eta_i: 1.0, eta_t: ior };
             let is_pane = glass.thin_walled && plan.effects.contains(Effect::ThinWalled);
             match plan.model {
                 Model::Path if is_pane => {
                     // Both lobes of a pane are masked as those of a mirror, and lose the same.
-                    albedo_table = albedos.table(facets, 1.0, MIRROR);
+                    albedo_table = albedos.table(Interface { eta_t: MIRROR, ..surface });
                 }
-                Model::Path | Model::Double => albedo_tables = albedos.pairs(facets, ior, &others),
-                _ => albedo_table = albedos.table(facets, 1.0, ior),
+                Model::Path | Model::Double => albedo_tables = albedos.pairs(surface, ior, &others),
+                _ => albedo_table = albedos.table(surface),
             }
         }
         // Infinite where a colour is 0: so dark that nothing is left after a millionth of the scene.

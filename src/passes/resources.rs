@@ -22,7 +22,7 @@ use crate::gpu::{
 };
 use crate::options::{Model, Trace};
 use crate::plan::{Budget, Estimator, Plan};
-use crate::scene::{Panorama, Scene, Surroundings, Texture};
+use crate::scene::{Panorama, PointLight, Scene, Surroundings, Texture};
 
 /// The id of `ENVIRONMENT_IMAGE` in `shaders/environment.glsl`.
 const ENVIRONMENT_IMAGE: u32 = 64;
@@ -430,14 +430,17 @@ fn ranks_around_camera(scene: &Scene, geometry: &Geometry) -> [u32; 8] {
 
 fn lights(scene: &Scene, view: &View) -> Vec<LightRecord> {
     let scale = view.units_per_metre;
-    let record = |light: &crate::scene::PointLight| LightRecord {
-        position: ((light.position - view.position) * scale).as_vec3(),
-        // Irradiance is intensity over distance squared, and distances are scaled.
-        intensity: (light.intensity * scale * scale).as_vec3(),
-        cone_scale: light.cone.map_or(0.0, |cone| cone.falloff().0 as f32),
-        cone_offset: light.cone.map_or(1.0, |cone| cone.falloff().1 as f32),
-        axis: light.cone.map_or(DVec3::ZERO, |cone| cone.axis()).as_vec3(),
-        ..LightRecord::default()
+    let record = |light: &PointLight| {
+        let (cone_scale, cone_offset) = light.cone.map_or((0.0, 1.0), |cone| cone.falloff());
+        LightRecord {
+            position: ((light.position - view.position) * scale).as_vec3(),
+            // Irradiance is intensity over distance squared, and distances are scaled.
+            intensity: (light.intensity * scale * scale).as_vec3(),
+            cone_scale: cone_scale as f32,
+            cone_offset: cone_offset as f32,
+            axis: light.cone.map_or(DVec3::ZERO, |cone| cone.axis()).as_vec3(),
+            ..LightRecord::default()
+        }
     };
     scene.lights.iter().map(record).collect()
 }

@@ -1,7 +1,7 @@
 //! What is wrong with meshes for what they wear. In flow objects, meshes and materials, out flow bodies that are none as panes, and a line
 //! for each fault.
 
-use std::collections::HashSet;
+use std::collections::{BTreeSet, HashSet};
 use std::sync::Arc;
 
 use super::mesh_file::shorten;
@@ -59,8 +59,9 @@ fn joined_holes(object: &Object, objects: &[Object], meshes: &[Arc<Mesh>]) -> f6
     topology::share_of_holes(&positions, &triangles)
 }
 
-/// What is wrong with meshes, as far as it shows on what they are: only a medium wants a closed surface.
-pub fn faults_of_meshes(scene: &Scene, opened: &HashSet<usize>) -> Vec<String> {
+/// What is wrong with meshes, as far as it shows on what they are: only a medium wants a closed surface. They are those that were
+/// `opened`, by [`panes_of_open_bodies`], and those that were `repaired`, or all not.
+pub fn faults_of_meshes(scene: &Scene, opened: &HashSet<usize>, repaired: bool) -> Vec<String> {
     let meshes = &scene.meshes;
     let mut bounds_medium = vec![false; meshes.len()];
     for object in &scene.objects {
@@ -70,18 +71,19 @@ pub fn faults_of_meshes(scene: &Scene, opened: &HashSet<usize>) -> Vec<String> {
     for (number, (mesh, bounds_medium)) in meshes.iter().zip(bounds_medium).enumerate() {
         let is_pane = opened.contains(&number) && !bounds_medium;
         let open_edges = if bounds_medium || is_pane { mesh.faults.open_edges } else { 0 };
-        let faults = MeshFaults { open_edges, ..mesh.faults };
+        // Vertices that no triangle has show nowhere.
+        let faults = MeshFaults { open_edges, unused_vertices: 0, ..mesh.faults };
         if faults.is_empty() {
             continue;
         }
         let advice = if is_pane {
             let holes = (mesh.holes * 100.0).round();
             format!(
-                "; its holes are {holes} % of its area: it bounds no medium and counts as thin_walled = true, unless its [material] or --set has another"
+                "; its holes are {holes} % of its area: it bounds no medium and counts as thin_walled, unless [material] or --set says thin_walled = false"
             )
         } else if bounds_medium && !faults.is_closed() {
-            "; the surface is not closed and bounds no medium well: --repair may close it, or it wants thin_walled = true"
-                .into()
+            let what = if repaired { "--repair does not close it" } else { "--repair may close it" };
+            format!("; the surface is not closed and bounds no medium well: {what}, or it wants thin_walled = true")
         } else {
             String::new()
         };
@@ -91,6 +93,26 @@ pub fn faults_of_meshes(scene: &Scene, opened: &HashSet<usize>) -> Vec<String> {
     let before = warnings.len();
     warnings.extend(meshes.iter().filter_map(|mesh| mesh.mending.told(mesh)));
     shorten(&mut warnings, before, "meshes were repaired");
+    warnings
+}
+
+/// What panes have that only an inside shows.
+pub fn idle_insides(scene: &Scene) -> Vec<String> {
+    let worn: BTreeSet<usize> = scene.objects.iter().map(|object| object.material).collect();
+    let told = worn.into_iter().filter_map(|number| {
+        let Material { name, surface, .. } = &scene.materials[number];
+        let Surface::Dielectric(glass) = surface else { return None };
+        let absorbs = glass.attenuation_distance.is_finite() && glass.attenuation_color.min_element() < 1.0;
+        let what = match (absorbs, glass.disperses()) {
+            (true, true) => "attenuation and dispersion show",
+            (true, false) => "attenuation shows",
+            (false, true) => "dispersion shows",
+            (false, false) => return None,
+        };
+        glass.thin_walled.then(|| format!("material {name:?}: is thin-walled and has no inside, so that no {what}"))
+    });
+    let mut warnings = told.collect();
+    shorten(&mut warnings, 0, "thin-walled materials");
     warnings
 }
 

@@ -94,7 +94,7 @@ pub fn read(files: Files, path: &Path, overrides: &Overrides) -> Result<SceneFil
     for object in &objects {
         object.add_to(files, &mut assembly)?;
     }
-    let lights = lights.iter().map(|light| light.over(assembly.bounds())).collect();
+    let lights = LightSource::placed(&lights, || assembly.bounds());
     Ok(SceneFile { environment, camera, lights, render, assembly })
 }
 
@@ -108,7 +108,7 @@ fn camera(entry: Entry<'_>) -> Result<Camera> {
 }
 
 /// Lights that a scene file can have.
-#[derive(Clone, Copy, PartialEq)]
+#[derive(Clone, Copy)]
 enum LightKind {
     Point,
     Spot,
@@ -117,36 +117,39 @@ enum LightKind {
 
 fn light(entry: Entry<'_>) -> Result<LightSource> {
     const NAME: &str = "[light]";
-    let kind = entry.any_table(NAME)?.require("kind")?;
     let kinds = [("point", LightKind::Point), ("spot", LightKind::Spot), ("directional", LightKind::Directional)];
-    let kind = kind.choice(&kinds)?;
-    let own: &[_] = match kind {
-        LightKind::Point => &["position", "intensity"],
-        LightKind::Spot => &["position", "intensity", "direction", "inner_cone_angle", "outer_cone_angle"],
-        LightKind::Directional => &["direction", "irradiance"],
+    let kind = entry.any_table(NAME)?.require("kind")?.choice(&kinds)?;
+    let point = |table: &Table<'_>| -> Result<PointLight> {
+        Ok(PointLight::new(table.require("position")?.triple(&LENGTH)?, table.require("intensity")?.triple(&LIGHT)?))
     };
-    let table = entry.table(NAME, &[&["kind"], own].concat())?;
-    let direction = || {
+    let direction = |table: &Table<'_>| {
         let entry = table.require("direction")?;
-        entry.triple(&FINITE)?.try_normalize().ok_or_else(|| entry.error("direction: has no length"))
+        let direction = entry.triple(&LENGTH)?.try_normalize();
+        direction.ok_or_else(|| entry.error("direction: expected three numbers, not all 0"))
     };
-    if kind == LightKind::Directional {
-        return Ok(LightSource::Sun(Sun {
-            direction: direction()?,
-            irradiance: table.require("irradiance")?.triple(&LIGHT)?,
-        }));
+    match kind {
+        LightKind::Point => {
+            let table = entry.table(NAME, &["kind", "position", "intensity"])?;
+            Ok(LightSource::Point(point(&table)?))
+        }
+        LightKind::Spot => {
+            let keys = ["kind", "position", "intensity", "direction", "inner_cone_angle", "outer_cone_angle"];
+            let table = entry.table(NAME, &keys)?;
+            let angle = |key, default| table.or(key, default, |entry| entry.number(&HALF_ANGLE));
+            let (inner, outer) = (angle("inner_cone_angle", 0.0)?, angle("outer_cone_angle", 45.0)?);
+            let cone = Cone::new(direction(&table)?, inner.to_radians(), outer.to_radians());
+            let cone = cone.ok_or_else(|| {
+                let wanted = "expected one that is not below inner_cone_angle, and above 0";
+                table.error(format!("[[light]]: outer_cone_angle {outer} with inner_cone_angle {inner}: {wanted}"))
+            })?;
+            Ok(LightSource::Point(PointLight { cone: Some(cone), ..point(&table)? }))
+        }
+        LightKind::Directional => {
+            let table = entry.table(NAME, &["kind", "direction", "irradiance"])?;
+            let irradiance = table.require("irradiance")?.triple(&LIGHT)?;
+            Ok(LightSource::Sun(Sun { direction: direction(&table)?, irradiance }))
+        }
     }
-    let light =
-        PointLight::new(table.require("position")?.triple(&LENGTH)?, table.require("intensity")?.triple(&LIGHT)?);
-    if kind == LightKind::Point {
-        return Ok(LightSource::Point(light));
-    }
-    let angle = |key, default| table.or(key, default, |entry| entry.number(&HALF_ANGLE));
-    let (inner, outer) = (angle("inner_cone_angle", 0.0)?, angle("outer_cone_angle", 45.0)?);
-    let cone = Cone::new(direction()?, inner.to_radians(), outer.to_radians()).ok_or_else(|| {
-        table.error(format!("[[light]]: inner_cone_angle {inner} is not below outer_cone_angle {outer}"))
-    })?;
-    Ok(LightSource::Point(PointLight { cone: Some(cone), ..light }))
 }
 
 /// Reads what refers to other files.

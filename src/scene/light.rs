@@ -34,12 +34,14 @@ pub struct Cone {
 
 impl Cone {
     /// Light of full strength up to `inner` radians off `direction`, which falls to nothing at `outer`; `None` for a direction
-    /// of no length, or angles other than 0 <= inner < outer <= pi/2.
+    /// of no length, or angles other than 0 <= inner <= outer <= pi/2 with an outer one above 0.
     pub fn new(direction: DVec3, inner: f64, outer: f64) -> Option<Self> {
         // A hair above, for angles that were degrees or 32-bit numbers.
-        let is_cone = 0.0 <= inner && inner < outer && outer <= FRAC_PI_2 + 1e-6;
+        let is_cone = 0.0 <= inner && inner <= outer && outer > 0.0 && outer <= FRAC_PI_2 + 1e-6;
         let axis = direction.try_normalize().filter(|_| is_cone)?;
-        let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-3);
+        // A hard edge is as wide as 32 bits tell cosines apart. The 1e-3 of the extension's example would leave a fiftieth of the
+        // light of a cone of one degree.
+        let scale = 1.0 / (inner.cos() - outer.cos()).max(1e-6);
         Some(Self { axis, scale, offset: -outer.cos() * scale })
     }
 
@@ -78,15 +80,18 @@ pub enum LightSource {
 }
 
 impl LightSource {
-    /// A light in its place, for what lies in `bounds`.
-    pub fn over(&self, bounds: Bounds) -> PointLight {
-        match self {
-            Self::Point(light) => *light,
-            Self::Sun(sun) => {
+    /// Lights in their places, for what lies in `bounds`; without that a sun shines on nothing, and is none.
+    pub fn placed(lights: &[Self], bounds: impl FnOnce() -> Bounds) -> Vec<PointLight> {
+        let bounds = lights.iter().any(|light| matches!(light, Self::Sun(_))).then(bounds);
+        let bounds = bounds.filter(|bounds| !bounds.is_empty());
+        let place = |light: &Self| match light {
+            Self::Point(light) => Some(*light),
+            Self::Sun(sun) => bounds.map(|bounds| {
                 let distance = Sun::FAR * bounds.extent().length().max(f64::MIN_POSITIVE);
                 PointLight::new(bounds.center() - sun.direction * distance, sun.irradiance * distance * distance)
-            }
-        }
+            }),
+        };
+        lights.iter().filter_map(place).collect()
     }
 }
 
@@ -102,12 +107,30 @@ mod tests {
         assert_eq!(cone.axis(), DVec3::NEG_Y);
         assert_eq!([share(0.0), share(0.199), share(0.601), share(3.0)], [1.0, 1.0, 0.0, 0.0]);
         assert!((0.0..1.0).contains(&share(0.4)) && share(0.3) > share(0.4));
+        // Narrow ones are as bright, and so is one with a hard edge.
+        for (inner, outer, full) in [(0.0, 0.0175, 0.0), (0.0175, 0.0175, 0.017), (FRAC_PI_2, FRAC_PI_2, 1.57)] {
+            let (scale, offset) = Cone::new(DVec3::X, inner, outer).unwrap().falloff();
+            let share = |angle: f64| (angle.cos() * scale + offset).clamp(0.0, 1.0).powi(2);
+            assert!((share(full) - 1.0).abs() < 1e-9 && share(outer + 1e-3) == 0.0, "{inner} {outer}");
+        }
+    }
+
+    #[test]
+    fn suns_shine_on_what_is_there() {
+        let sun = LightSource::Sun(Sun { direction: DVec3::NEG_Y, irradiance: DVec3::ONE });
+        let lights = [sun, LightSource::Point(PointLight::new(DVec3::X, DVec3::ONE))];
+        let bounds = Bounds::around([DVec3::ZERO, DVec3::new(3.0, 0.0, 4.0)].into_iter());
+        let placed = LightSource::placed(&lights, || bounds);
+        assert_eq!(placed[0].position, DVec3::new(1.5, 5e4, 2.0));
+        assert_eq!(placed[0].intensity, DVec3::splat(25e8));
+        assert_eq!(LightSource::placed(&lights, || Bounds::EMPTY).len(), 1);
+        assert_eq!(LightSource::placed(&lights[1..], || unreachable!()).len(), 1);
     }
 
     #[test]
     fn what_is_no_cone_is_none() {
         assert_eq!(Cone::new(DVec3::ZERO, 0.0, 0.5), None);
-        for (inner, outer) in [(0.5, 0.5), (0.6, 0.5), (-0.1, 0.5), (0.0, 1.6), (f64::NAN, 0.5), (0.0, f64::NAN)] {
+        for (inner, outer) in [(0.0, 0.0), (0.6, 0.5), (-0.1, 0.5), (0.0, 1.6), (f64::NAN, 0.5), (0.0, f64::NAN)] {
             assert_eq!(Cone::new(DVec3::X, inner, outer), None, "{inner} {outer}");
         }
         assert!(Cone::new(DVec3::X, 0.0, FRAC_PI_2).is_some());

@@ -204,11 +204,11 @@ impl Material {
         };
         match &mut self.surface {
             Surface::Dielectric(glass) => {
-                let mut none = Coating::default();
-                let coating = glass.coating.as_deref_mut().unwrap_or(&mut none);
-                check(&mut coating.base_color_texture);
+                if let Some(coating) = &mut glass.coating {
+                    check(&mut coating.base_color_texture);
+                    check(&mut coating.transmission_texture);
+                }
                 check(&mut glass.metallic_roughness_texture);
-                check(&mut coating.transmission_texture);
             }
             Surface::Opaque(opaque) => {
                 check(&mut opaque.base_color_texture);
@@ -216,8 +216,9 @@ impl Material {
                 check(&mut opaque.emission_texture);
             }
         }
-        let mut none = None;
-        check(self.cutout.as_mut().map_or(&mut none, |cutout| &mut cutout.map));
+        if let Some(cutout) = &mut self.cutout {
+            check(&mut cutout.map);
+        }
         if self.normal_map.as_mut().is_some_and(|normal| !keep(&mut normal.map)) {
             self.normal_map = None;
         }

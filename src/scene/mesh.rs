@@ -412,6 +412,10 @@ mod tests {
         };
         let unused = MeshFaults { unused_vertices: 2, ..MeshFaults::default() };
         assert_eq!(ball(0.0), unused);
+        // Far from the origin a rounding is wider than things are, and nothing of it is a crack.
+        let far = [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [1.0, 1.0]].map(|[x, y]| [6.4e6 + x, y, 0.0]);
+        let sheet = mesh(&far, &[], &[[0, 1, 3], [0, 3, 2]]).unwrap();
+        assert_eq!((sheet.positions[1], sheet.faults.open_edges), ([6.4e6 + 1.0, 0.0, 0.0], 4));
         let torn = ball(1e-5);
         assert!(torn.open_edges >= 2 * down as usize - 2, "{torn}");
     }

@@ -52,8 +52,9 @@ pub use touching::Touch;
 use crate::options::RenderArgs;
 use crate::{Error, Result};
 use assembly::{Assembly, Placement, Wear};
-use faults::{faults_of_meshes, missing_uvs, panes_of_open_bodies};
+use faults::{faults_of_meshes, idle_insides, missing_uvs, panes_of_open_bodies};
 use file::{EnvironmentTable, Light, SceneFile};
+use light::LightSource;
 use mesh_file::MeshFile;
 
 /// Everything that a picture shows.
@@ -67,7 +68,7 @@ pub struct Scene {
     pub camera: Camera,
     /// The camera was not given: [`Scene::frame`] may move it.
     pub framed: bool,
-    /// Point lights.
+    /// Lights without extent.
     pub lights: Vec<PointLight>,
     /// Materials, each with its name.
     pub materials: Vec<Material>,
@@ -221,10 +222,11 @@ impl Scene {
             files,
         };
         scene.set(&overrides.settings)?;
-        let faults = faults_of_meshes(&scene, &opened);
+        let repaired = overrides.repair.or(scene.render.repair) == Some(true);
+        let faults = faults_of_meshes(&scene, &opened, repaired);
         scene.warnings.splice(0..0, faults);
-        let bare = missing_uvs(&scene);
-        scene.warnings.extend(bare);
+        let idle = [missing_uvs(&scene), idle_insides(&scene)].concat();
+        scene.warnings.extend(idle);
         Ok(scene)
     }
 
@@ -263,7 +265,7 @@ fn bare_mesh(path: &Path, overrides: &Overrides) -> Result<SceneFile> {
     let place = Placement { number, transform: DAffine3::IDENTITY, smooth: true };
     let MeshFile { camera, lights, scene_warnings, .. } = assembly.add(Files::Disk, path, wear, &place)?;
     let (camera, lights, mut warnings) = (*camera, std::mem::take(lights), std::mem::take(scene_warnings));
-    let lights = lights.iter().map(|light| light.over(assembly.bounds())).collect();
+    let lights = LightSource::placed(&lights, || assembly.bounds());
     // A file's camera looks along a direction: what it turns around lies as far off as the middle of the scene.
     let camera = camera.map(|camera| camera.aimed_at(assembly.bounds().center()));
     assembly.warnings.append(&mut warnings);

@@ -151,20 +151,22 @@ fn image_of(rest: &str) -> Option<(Vec<&str>, &str)> {
     (!name.is_empty()).then_some((options, name))
 }
 
-/// How an image is to be looked at.
-struct ImageOptions {
+/// What a line says of an image.
+struct MapLine {
+    /// The file, which exists.
+    path: PathBuf,
+    /// How it lies on surfaces; the texture is not known yet.
     map: TextureMap,
     /// Its strength as a bump.
     strength: f64,
     /// The number of a texel that counts; `None`: how bright it is.
     channel: Option<usize>,
-    /// The first that is not read.
-    unknown: Option<String>,
 }
 
-impl ImageOptions {
-    fn new(words: &[&str]) -> Self {
-        let mut options = Self { map: TextureMap::of(0), strength: 1.0, channel: None, unknown: None };
+impl MapLine {
+    /// Of the options that stand before the file's name; what is wrong with them goes to `remark`.
+    fn new(path: PathBuf, words: &[&str], mut remark: impl FnMut(String)) -> Self {
+        let mut line = Self { path, map: TextureMap::of(0), strength: 1.0, channel: None };
         let (mut scale, mut offset) = (DVec2::ONE, DVec2::ZERO);
         // A number begins with a sign, too.
         let is_option = |word: &&&str| word.starts_with('-') && word.parse::<f64>().is_err();
@@ -174,21 +176,33 @@ impl ImageOptions {
             while let Some(&value) = rest.next_if(|word| !is_option(word)) {
                 values.push(value);
             }
-            let number = |i: usize| values.get(i).and_then(|word| word.parse().ok()).filter(|x: &f64| x.abs() <= 1e6);
+            let mut number = |i: usize, default: f64| {
+                let Some(word) = values.get(i) else { return default };
+                let Ok(value) = word.parse::<f64>() else {
+                    remark(format!("{option} {word} is no number; {default} is used"));
+                    return default;
+                };
+                let used = if value.is_nan() { default } else { value.clamp(-1e3, 1e3) };
+                if used != value {
+                    remark(format!("{option} {value} is not between -1000 and 1000; {used} is used"));
+                }
+                used
+            };
             match option {
-                "-s" => scale = DVec2::new(number(0).unwrap_or(1.0), number(1).unwrap_or(1.0)),
-                "-o" => offset = DVec2::new(number(0).unwrap_or(0.0), number(1).unwrap_or(0.0)),
-                "-bm" => options.strength = number(0).unwrap_or(1.0).clamp(-1e3, 1e3),
-                "-clamp" if values == ["on"] => options.map.wrap = [Wrap::Clamp; 2],
-                "-imfchan" => options.channel = ["r", "g", "b", "m"].iter().position(|name| values == [*name]),
+                "-s" => scale = DVec2::new(number(0, 1.0), number(1, 1.0)),
+                "-o" => offset = DVec2::new(number(0, 0.0), number(1, 0.0)),
+                "-bm" => line.strength = number(0, 1.0),
+                "-clamp" if values == ["on"] => line.map.wrap = [Wrap::Clamp; 2],
+                "-imfchan" => line.channel = ["r", "g", "b", "m"].iter().position(|name| values == [*name]),
+                // They say how an image is filtered, or what it is for.
                 "-clamp" | "-blendu" | "-blendv" | "-boost" | "-texres" | "-type" | "-cc" => {}
-                other => options.unknown = options.unknown.or(Some(other.to_owned())),
+                other => remark(format!("{other} is not read")),
             }
         }
-        options.map.turn = DMat2::from_diagonal(scale);
+        line.map.turn = DMat2::from_diagonal(scale);
         // MTL's v points upwards.
-        options.map.offset = DVec2::new(offset.x, 1.0 - scale.y - offset.y);
-        options
+        line.map.offset = DVec2::new(offset.x, 1.0 - scale.y - offset.y);
+        line
     }
 }
 
@@ -204,6 +218,9 @@ impl Converter<'_> {
     fn convert(mut self) -> Material {
         let surface =
             if self.is_dielectric() { Surface::Dielectric(self.dielectric()) } else { Surface::Opaque(self.opaque()) };
+        if matches!(surface, Surface::Dielectric(_)) && self.material.unknown_param.contains_key("map_Pm") {
+            self.remark("map_Pm is not read of glass");
+        }
         if let Some(key) =
             ["map_Ks", "map_Ns", "map_Tr"].into_iter().find(|key| self.material.unknown_param.contains_key(*key))
         {
@@ -238,7 +255,14 @@ impl Converter<'_> {
         };
         let roughness =
             self.number("Pr").map_or(clear.roughness, |r| self.within("Pr", r.into(), 0.0, 1.0, clear.roughness));
-        let metallic_roughness_texture = self.finish(&["map_Pr"]);
+        let metallic_roughness_texture = self.finish(/* with_metal: */ false);
+        // Programs without PBR write a shininess alone, and 1000 for what is clear.
+        let shininess = self.material.shininess.filter(|&shininess| shininess < 900.0 && self.number("Pr").is_none());
+        if let Some(shininess) = shininess.filter(|_| metallic_roughness_texture.is_none()) {
+            self.remark(&format!(
+                "Ns {shininess} is not read; a roughness of {roughness} is used, which Pr would tell"
+            ));
+        }
         let filter =
             self.triple("Tf").map(|filter| self.color("Tf", filter, 1.0)).filter(|&filter| filter != DVec3::ONE);
         let (attenuation_color, attenuation_distance) = match filter {
@@ -270,7 +294,7 @@ impl Converter<'_> {
             base_color_texture,
             metallic,
             roughness,
-            metallic_roughness_texture: self.finish(&["map_Pr", "map_Pm"]),
+            metallic_roughness_texture: self.finish(/* with_metal: */ true),
             ior: plain.ior,
             specular,
             emission,
@@ -282,8 +306,9 @@ impl Converter<'_> {
         if let Some(map) = self.map("norm", Encoding::Data) {
             return Some(NormalMap { map, scale: 1.0 });
         }
-        let map = self.map("bump_image", Encoding::Bump)?;
-        Some(NormalMap { map, scale: self.options("bump_image").strength })
+        let MapLine { path, map, strength: scale, .. } = self.line("bump_image")?;
+        let image = Image { source: ImageSource::File(path), encoding: Encoding::Bump, replaces: false };
+        Some(NormalMap { map: self.worn(map, image), scale })
     }
 
     /// Where an image of `d` is black the surface is not there.
@@ -292,49 +317,40 @@ impl Converter<'_> {
     }
 
     fn map(&mut self, key: &str, encoding: Encoding) -> Option<TextureMap> {
-        let path = self.file(key)?;
+        let MapLine { path, map, .. } = self.line(key)?;
         // Exporters write anything for the colour beside an image.
-        let image = Image { source: ImageSource::File(path), encoding, replaces: key == "map_Kd" };
-        Some(self.placed(key, image))
+        Some(self.worn(map, Image { source: ImageSource::File(path), encoding, replaces: key == "map_Kd" }))
     }
 
     /// The images of roughness and metal, as far as there are, as one.
-    fn finish(&mut self, keys: &[&str]) -> Option<TextureMap> {
-        let mut channels = [None, None];
-        let mut first = None;
-        for (channel, key) in channels.iter_mut().zip(keys) {
-            if let Some(path) = self.file(key) {
-                *channel = Some(Channel { path, number: self.options(key).channel });
-                first = first.or(Some(*key));
-            }
+    fn finish(&mut self, with_metal: bool) -> Option<TextureMap> {
+        let rough = self.line("map_Pr");
+        let metal = if with_metal { self.line("map_Pm") } else { None };
+        let map = rough.as_ref().or(metal.as_ref())?.map;
+        if metal.as_ref().is_some_and(|metal| metal.map != map) {
+            self.remark("map_Pm has other options than map_Pr, which count for both");
         }
+        let channel = |line: MapLine| Channel { path: line.path, number: line.channel };
+        let mut channels = [rough.map(channel), metal.map(channel)];
         // One image for both that does not say more is one as glTF has it.
         if let [Some(rough), Some(metal)] = &mut channels
             && rough == metal
+            && rough.number.is_none()
         {
             (rough.number, metal.number) = (Some(1), Some(2));
         }
-        let image = Image { source: ImageSource::Finish(channels), encoding: Encoding::Data, replaces: true };
-        first.map(|key| self.placed(key, image))
+        let source = ImageSource::Finish(channels);
+        Some(self.worn(map, Image { source, encoding: Encoding::Data, replaces: true }))
     }
 
-    fn options(&self, key: &str) -> ImageOptions {
-        let text = self.material.unknown_param.get(&format!("{key}_options"));
-        ImageOptions::new(&text.map_or(Vec::new(), |text| text.split_whitespace().collect()))
-    }
-
-    /// `image`, as the options of `key` have it on surfaces.
-    fn placed(&mut self, key: &str, image: Image) -> TextureMap {
-        let options = self.options(key);
-        if let Some(unknown) = options.unknown {
-            self.remark(&format!("{unknown} of {} is not read", spoken(key)));
-        }
+    /// `image`, on surfaces as `map` says.
+    fn worn(&mut self, map: TextureMap, image: Image) -> TextureMap {
         self.images.push(image);
-        TextureMap { texture: self.images.len() - 1, ..options.map }
+        TextureMap { texture: self.images.len() - 1, ..map }
     }
 
-    /// The image file of `key`, if it exists.
-    fn file(&mut self, key: &str) -> Option<PathBuf> {
+    /// What the line of `key` says, if there is one and its file exists.
+    fn line(&mut self, key: &str) -> Option<MapLine> {
         let material = self.material;
         let name = match key {
             "map_Kd" => material.diffuse_texture.as_ref(),
@@ -343,16 +359,19 @@ impl Converter<'_> {
         };
         // Exporters for Windows write its separator.
         let path = self.path.parent().unwrap_or(Path::new("")).join(name?.replace('\\', "/"));
-        if self.files.exists(&path) {
-            return Some(path);
+        let spoken = if key == "bump_image" { "map_Bump" } else { key };
+        if !self.files.exists(&path) {
+            let instead = match key {
+                "map_Kd" => "; the colour is used",
+                "map_Pr" | "map_Pm" => "; the number is used",
+                _ => "; left out",
+            };
+            self.remark(&format!("{spoken} {:?} does not exist{instead}", path.display().to_string()));
+            return None;
         }
-        let instead = match key {
-            "map_Kd" => "; the colour is used",
-            "map_Pr" | "map_Pm" => "; the number is used",
-            _ => "; left out",
-        };
-        self.remark(&format!("{} {:?} does not exist{instead}", spoken(key), path.display().to_string()));
-        None
+        let options = material.unknown_param.get(&format!("{key}_options"));
+        let words: Vec<_> = options.map_or("", String::as_str).split_whitespace().collect();
+        Some(MapLine::new(path, &words, |what| self.remark(&format!("{spoken}: {what}"))))
     }
 
     fn number(&self, key: &str) -> Option<f32> {
@@ -379,9 +398,4 @@ impl Converter<'_> {
     fn remark(&mut self, what: &str) {
         self.remarks.push(format!("{}: material {:?}: {what}", self.path.display(), self.material.name));
     }
-}
-
-/// A key as MTL has it.
-fn spoken(key: &str) -> &str {
-    if key == "bump_image" { "map_Bump" } else { key }
 }

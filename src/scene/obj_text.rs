@@ -197,7 +197,6 @@ impl Tidy {
                 if others == 0 { message.clone() } else { format!("{message}; so do {others} more faces") },
             ));
         }
-        let unused = used.iter().filter(|used| !**used).count();
         for (count, one, many) in [
             (slivers, "face with less than three corners", "faces with less than three corners"),
             (wires, "line or point, as only faces are shown,", "lines and points, as only faces are shown,"),
@@ -206,7 +205,6 @@ impl Tidy {
                 "line of free-form geometry, which should be triangles,",
                 "lines of free-form geometry, which should be triangles,",
             ),
-            (unused, "unused vertex", "unused vertices"),
             (unknown.len(), "line not understood", "lines not understood"),
         ] {
             if count > 0 {
@@ -460,7 +458,6 @@ mod tests {
                 "2 faces with less than three corners left out",
                 "1 line or point, as only faces are shown, left out",
                 "1 line of free-form geometry, which should be triangles, left out",
-                "1 unused vertex left out",
                 "2 lines not understood left out, the first is line 10",
             ]
         );

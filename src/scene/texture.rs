@@ -119,28 +119,32 @@ impl Texture {
 
     /// Roughness as green and metal as blue, each a number of an image or 1, as large as the larger one.
     fn finish(images: [Option<(Self, Option<usize>)>; 2]) -> Self {
-        let size = |of: fn(&Self) -> u32| images.iter().flatten().map(|(image, _)| of(image)).max().unwrap_or(1);
-        let (width, height) = (size(|image| image.width), size(|image| image.height));
-        let path = images.iter().flatten().next().map_or_else(PathBuf::new, |(image, _)| image.path.clone());
-        let [rough, metal] = images.map(|image| {
-            let (image, number) = image?;
+        let all = || images.iter().flatten().map(|(image, _)| image);
+        let width = all().map(|image| image.width).max().unwrap_or(1);
+        let height = all().map(|image| image.height).max().unwrap_or(1);
+        let path = all().next().map_or_else(PathBuf::new, |image| image.path.clone());
+        let is_eight = all().all(|image| matches!(image.texels, Texels::Unorm(_)));
+        let mut numbers = vec![[1.0; 4]; width as usize * height as usize];
+        for (target, image) in [1, 2].into_iter().zip(images) {
+            let Some((image, number)) = image else { continue };
             let grey = |texel: [f32; 4]| match number {
                 Some(number) => texel[number],
                 None => luminance(Vec3::from_slice(&texel).as_dvec3()) as f32,
             };
-            let numbers: Vec<_> = image.linear().map(grey).collect();
-            Some((numbers, image.width, image.height))
-        });
-        let at = |image: &Option<(Vec<f32>, u32, u32)>, x: u32, y: u32| {
-            let nearest = |at: u32, from: u32, to: u32| (u64::from(at) * u64::from(to) / u64::from(from)) as usize;
-            let of = |(numbers, w, h): &(Vec<f32>, u32, u32)| {
-                numbers[nearest(y, height, *h) * *w as usize + nearest(x, width, *w)]
-            };
-            f16::from_f32(image.as_ref().map_or(1.0, of))
+            let greys: Vec<_> = image.linear().map(grey).collect();
+            let nearest = |at: usize, from: u32, to: u32| at * to as usize / from as usize;
+            for (i, texel) in numbers.iter_mut().enumerate() {
+                let (x, y) = (i % width as usize, i / width as usize);
+                let (x, y) = (nearest(x, width, image.width), nearest(y, height, image.height));
+                texel[target] = greys[y * image.width as usize + x];
+            }
+        }
+        let code = |x: f32| (x * 255.0).round() as u8;
+        let texels = match is_eight {
+            true => Texels::Unorm(numbers.into_iter().map(|texel| texel.map(code)).collect()),
+            false => Texels::Linear(numbers.into_iter().map(|texel| texel.map(f16::from_f32)).collect()),
         };
-        let texel = |x, y| [f16::ONE, at(&rough, x, y), at(&metal, x, y), f16::ONE];
-        let texels = (0..height).flat_map(|y| (0..width).map(move |x| (x, y))).map(|(x, y)| texel(x, y)).collect();
-        Self { path, width, height, texels: Texels::Linear(texels) }
+        Self { path, width, height, texels }
     }
 
     /// Red, green, blue and alpha of each texel, linear.
@@ -170,6 +174,11 @@ impl Texture {
     pub fn mean(&self) -> DVec4 {
         let sum: DVec4 = self.linear().map(|texel| DVec4::from_array(texel.map(f64::from))).sum();
         sum / f64::from(self.width) / f64::from(self.height)
+    }
+
+    /// The smallest green, which is the smallest roughness where it tells that.
+    pub fn least_green(&self) -> f64 {
+        self.linear().map(|[_, g, ..]| g).fold(f32::INFINITY, f32::min).into()
     }
 
     /// The file's name, for messages.

@@ -284,11 +284,11 @@ fn values_of_the_wrong_type_or_range_say_what_is_expected() {
         ),
         (
             "[[light]]\nkind = \"directional\"\ndirection = [0, 0, 0]\nirradiance = [1, 1, 1]".into(),
-            "3: direction: has no length",
+            "3: direction: expected three numbers, not all 0",
         ),
         (
             format!("{SPOT}inner_cone_angle = 30\nouter_cone_angle = 20"),
-            "1: [[light]]: inner_cone_angle 30 is not below outer_cone_angle 20",
+            "1: [[light]]: outer_cone_angle 20 with inner_cone_angle 30: expected one that is not below inner_cone_angle, and above 0",
         ),
         (
             format!("{SPOT}outer_cone_angle = 91"),

@@ -15,7 +15,7 @@ fn what_is_wrong_with_a_mesh_is_told_with_counts() {
         folder.load("mesh.obj")
     };
     let open = load(TETRAHEDRON.replace("f 2 3 4\n", "f 2 2 3\n")).unwrap();
-    let expected = "mesh.obj: 3 open edges, 1 degenerate triangle removed; its holes are 58 % of its area: it bounds no medium and counts as thin_walled = true, unless its [material] or --set has another";
+    let expected = "mesh.obj: 3 open edges, 1 degenerate triangle removed; its holes are 58 % of its area: it bounds no medium and counts as thin_walled, unless [material] or --set says thin_walled = false";
     assert_eq!(open.warnings[0], expected);
     let inverted = load(
         TETRAHEDRON
@@ -287,7 +287,12 @@ fn mtl_places_images() {
         assert!(at(opaque.emission_texture, u, v).abs_diff_eq(DVec2::new(u - 0.125, v), 1e-12), "{u} {v}");
     }
     let scene = with_mtl(&folder, "map_Kd -mm 0.5 2 sky.png");
-    assert!(scene.warnings[0].ends_with("-mm of map_Kd is not read"), "{:?}", scene.warnings);
+    assert!(scene.warnings[0].ends_with("map_Kd: -mm is not read"), "{:?}", scene.warnings);
+    let scene = with_mtl(&folder, "map_Bump -bm abc sky.png\nmap_Kd -s nan 2000 sky.png");
+    let said = scene.warnings.join("\n");
+    for wanted in ["map_Bump: -bm abc is no number; 1 is used", "map_Kd: -s NaN", "-s 2000 is not between"] {
+        assert!(said.contains(wanted), "{wanted}: {said}");
+    }
 }
 
 /// Images of roughness and of metal become one, each in the place of its number.
@@ -321,6 +326,9 @@ fn mtl_images_of_roughness_and_metal_are_one() {
     );
     assert_eq!(finish("map_Pr both.png\nmap_Pm both.png").2, [[51, 102]], "as glTF has it");
     assert_eq!(finish("map_Pr -imfchan b both.png\nmap_Pm -imfchan r both.png").2, [[102, 255]]);
+    assert_eq!(finish("map_Pr -imfchan r both.png\nmap_Pm -imfchan r both.png").2, [[255, 255]]);
+    let scene = with_mtl(&folder, "map_Pr -s 2 2 both.png\nmap_Pm both.png");
+    assert!(scene.warnings[0].ends_with("map_Pm has other options than map_Pr, which count for both"));
     assert_eq!(finish("map_Pr none.png\nmap_Pm rough.png").0, 0.5);
     fs::write(folder.path("bad.png"), "no image").unwrap();
     assert_eq!(finish("map_Pr bad.png\nmap_Pm rough.png"), (0.5, 0.25, vec![]));
@@ -328,6 +336,12 @@ fn mtl_images_of_roughness_and_metal_are_one() {
     let (surface, _) = from_mtl(&folder, "illum 7\nPr 0.5\nmap_Pr rough.png");
     let Surface::Dielectric(glass) = surface else { panic!("{surface:?}") };
     assert_eq!((glass.roughness, glass.metallic_roughness_texture), (1.0, Some(TextureMap::of(0))));
+    let (surface, warnings) = from_mtl(&folder, "illum 7\nPr 0.5\nmap_Pm metal.png");
+    assert!(matches!(surface, Surface::Dielectric(glass) if glass.roughness == 0.5));
+    assert!(warnings[0].ends_with("map_Pm is not read of glass"), "{warnings:?}");
+    let (_, warnings) = from_mtl(&folder, "illum 7\nNs 250");
+    assert!(warnings[0].contains("Ns 250 is not read"), "{warnings:?}");
+    assert!(from_mtl(&folder, "illum 7\nNs 1000").1.is_empty());
 }
 
 /// What is said of a sheet is of what it is in the end.
@@ -345,7 +359,18 @@ fn open_bodies_are_told_as_what_they_are() {
         (dielectric(&scene, 0).thin_walled, scene.warnings[0].clone())
     };
     let (thin, warning) = told(None);
-    assert!(thin && warning.contains("counts as thin_walled = true"), "{warning}");
+    assert!(thin && warning.contains("counts as thin_walled, unless"), "{warning}");
+    // What panes have no use for.
+    let tinted =
+        scene.replace("dielectric\"", "dielectric\"\nattenuation_color = [1, 0.5, 0.5]\nattenuation_distance = 1");
+    folder.write("sheet.toml", tinted);
+    let path = folder.path("sheet.toml");
+    let warnings = Scene::load(Some(&path), &Overrides::default()).unwrap().warnings;
+    assert!(warnings[1].ends_with("has no inside, so that no attenuation shows"), "{warnings:?}");
+    let repaired =
+        Overrides { repair: Some(true), settings: vec!["material.m.thin_walled=false".into()], ..Overrides::default() };
+    let warnings = Scene::load(Some(&path), &repaired).unwrap().warnings;
+    assert!(warnings[0].contains("--repair does not close it"), "{warnings:?}");
     let (thin, warning) = told(Some("material.m.thin_walled=false"));
     assert!(!thin && warning.contains("bounds no medium well"), "{warning}");
 }
@@ -390,7 +415,7 @@ fn open_bodies_are_panes() {
     let pane = |scene: &Scene, index| dielectric(scene, index).thin_walled;
     let scene = folder.load("sheet.obj").unwrap();
     assert!(pane(&scene, 0));
-    let expected = "sheet.obj: 4 open edges; its holes are 100 % of its area: it bounds no medium and counts as thin_walled = true, unless its [material] or --set has another";
+    let expected = "sheet.obj: 4 open edges; its holes are 100 % of its area: it bounds no medium and counts as thin_walled, unless [material] or --set says thin_walled = false";
     assert!(scene.warnings.contains(&expected.into()), "{:?}", scene.warnings);
     // A box without two sides that meet: over both a sheet would bend.
     folder.write(

@@ -81,7 +81,9 @@ pub fn close_hairlines(positions: &mut [[f32; 3]], rims: &[u32]) -> bool {
     }
     let mut is_on_rim = vec![false; positions.len()];
     rims.iter().for_each(|&vertex| is_on_rim[vertex as usize] = true);
-    let near = roundings(bounds_of(positions));
+    let bounds = bounds_of(positions);
+    // Far from the origin a rounding is as wide as things are.
+    let near = roundings(bounds).min(NEAR * bounds.extent().max_element());
     weld_near(positions, near, |vertex| is_on_rim[vertex as usize]) > 0
 }
 

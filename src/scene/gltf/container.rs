@@ -92,7 +92,10 @@ impl Resources<'_> {
                         match of_files.get(&path) {
                             Some(bytes) => bytes.clone(),
                             None => {
-                                let bytes = Rc::new(self.files.read(&path)?);
+                                let read = self.files.read(&path);
+                                let bytes =
+                                    read.map_err(|error| self.wrong(format!("buffer {number}: {}", error.in_full())))?;
+                                let bytes = Rc::new(bytes);
                                 of_files.insert(path.clone(), bytes.clone());
                                 self.read.push(path);
                                 bytes

@@ -1,5 +1,5 @@
 //! glTF 2.0 and GLB. In flow the bytes of a file and of what it names, out flow meshes in their places, what they wear,
-//! the first camera and the point lights.
+//! the first camera and the lights.
 //!
 //! A mesh is cut where the material changes and only there, because a piece of a closed surface bounds no medium. Meshes
 //! that are made of the same numbers are one, wherever they stand. What is not supported is said once, by name.
@@ -86,6 +86,9 @@ impl Remarks {
 pub fn read(files: Files, path: &Path, preparation: Preparation) -> Result<MeshFile> {
     let wrong = |message: String| Error::input(path, 0, message);
     let bytes = files.read(path)?;
+    if bytes.is_empty() {
+        return Err(wrong("is empty; export the model again".into()));
+    }
     let Container { json, binary } = Container::new(&bytes).map_err(wrong)?;
     let root: json::Root = json::deserialize::from_slice(json).map_err(|error| {
         let line = if bytes.starts_with(b"glTF") { 0 } else { error.line() };
@@ -150,6 +153,9 @@ fn check(root: &json::Root) -> Result<(), String> {
         return Err(format!(
             "is compressed with {name}, which is not read; open it in a program that does, as Blender, and export it without compression"
         ));
+    }
+    if !root.asset.version.starts_with("2.") {
+        return Err(format!("is glTF of version {:?}; only 2 is read, convert it", root.asset.version));
     }
     let unknown = |name: &&String| !KNOWN.contains(&name.as_str());
     if let Some(name) = root.extensions_required.iter().find(unknown) {
@@ -291,23 +297,23 @@ impl SceneParts {
             return;
         }
         let point = PointLight::new(place, color);
-        let source = match light.kind() {
-            Kind::Point => LightSource::Point(point),
-            Kind::Directional => match direction {
-                Some(direction) => LightSource::Sun(Sun { direction, irradiance: color }),
-                None => {
-                    self.remarks.say(format!("light {number}: has no direction; left out"));
-                    return;
-                }
-            },
-            Kind::Spot { inner_cone_angle, outer_cone_angle } => {
+        let source = match (light.kind(), direction) {
+            (Kind::Point, _) => LightSource::Point(point),
+            (Kind::Directional, Some(direction)) => LightSource::Sun(Sun { direction, irradiance: color }),
+            (Kind::Directional | Kind::Spot { .. }, None) => {
+                self.remarks.say(format!(
+                    "light {number}: its node is scaled to nothing, so that it has no direction; left out"
+                ));
+                return;
+            }
+            (Kind::Spot { inner_cone_angle, outer_cone_angle }, Some(direction)) => {
                 let (inner, outer) = (f64::from(inner_cone_angle), f64::from(outer_cone_angle));
-                match direction.and_then(|direction| Cone::new(direction, inner, outer)) {
+                match Cone::new(direction, inner, outer) {
                     cone @ Some(_) => LightSource::Point(PointLight { cone, ..point }),
                     None => {
                         self.remarks.say(format!(
-                            "light {number}: has no direction, or its angles {inner_cone_angle} and {outer_cone_angle} are \
-                             not 0 <= inner < outer <= pi/2; left out"
+                            "light {number}: its angles {inner_cone_angle} and {outer_cone_angle} are \
+                             not 0 <= inner <= outer <= pi/2, the outer one above 0; left out"
                         ));
                         return;
                     }
