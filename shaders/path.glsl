@@ -400,7 +400,9 @@ void main()
     }
     float samples = float(samplesInBatch);
     float scale = frame.cameraIndex * frame.cameraIndex;
-    AddBatch(place, scale * sum / samples, vec3(interfaces, rays, scale * Largest(discarded)) / samples);
+    // Paths of one colour each are white together: the largest channel of a few of them is too large.
+    float lost = DISPERSION ? dot(discarded, vec3(1.0 / 3.0)) : Largest(discarded);
+    AddBatch(place, scale * sum / samples, vec3(interfaces, rays, scale * lost) / samples);
 }
 
 #endif

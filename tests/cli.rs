@@ -149,7 +149,7 @@ fn explain_needs_no_driver_and_tells_people_and_programs() {
     assert!(text.contains("wanted all the same\n  shadows "), "the scene's own options count: {text}");
 
     // A corner that is two: what ails it, and what is left of that once it is repaired.
-    let cracked = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 2e-7\nf 1 3 5\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
+    let cracked = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nv 1 0 7e-7\nf 1 3 5\nf 1 2 4\nf 1 4 3\nf 2 3 4\n";
     fs::write(folder.path().join("cracked.obj"), cracked).expect("a mesh");
     let (_, text, _) = explain(&["cracked.obj"]);
     assert!(text.contains("\nWhat ails objects\n  object 1, cracked.obj\n    4 open edges, the first at ("), "{text}");

@@ -112,7 +112,7 @@ fn tidy_line(line: &str) -> Option<String> {
                 _ => None,
             }
         }
-        "Ni" | "d" | "Tr" | "Pr" | "Pm" => {
+        "Ni" | "Ns" | "d" | "Tr" | "Pr" | "Pm" => {
             let words: Vec<_> = rest.split_whitespace().filter(|word| *word != "-halo").collect();
             let number: f32 = words.first()?.parse().ok()?;
             Some(format!("{keyword} {number}"))
