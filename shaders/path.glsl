@@ -294,7 +294,7 @@ void main()
             path = ray;
             travelled += arrival.distance;
             goesOn = !ends;
-            if (ends) discarded += max(ray.throughput, vec3(0.0));
+            if (ends) discarded += ray.throughput;
         } else {
             if (isOpaque && Largest(material.emission) > 0.0) {
                 float weight = 1.0;
@@ -305,7 +305,7 @@ void main()
                 sum += weight * ray.throughput * material.emission / (crossing.etaI * crossing.etaI);
             }
             goesOn = depth < frame.maxDepth;
-            if (!goesOn) discarded += max(ray.throughput, vec3(0.0));
+            if (!goesOn) discarded += ray.throughput;
         }
 
         bool scatters = !isLight && meets && !passes;
@@ -401,7 +401,7 @@ void main()
     float samples = float(samplesInBatch);
     float scale = frame.cameraIndex * frame.cameraIndex;
     // Paths of one colour each are white together: the largest channel of a few of them is too large.
-    float lost = DISPERSION ? dot(discarded, vec3(1.0 / 3.0)) : Largest(discarded);
+    float lost = max(DISPERSION ? dot(discarded, vec3(1.0 / 3.0)) : Largest(discarded), 0.0);
     AddBatch(place, scale * sum / samples, vec3(interfaces, rays, scale * lost) / samples);
 }
 
