@@ -119,7 +119,7 @@ mod tests {
     fn suns_shine_on_what_is_there() {
         let sun = LightSource::Sun(Sun { direction: DVec3::NEG_Y, irradiance: DVec3::ONE });
         let lights = [sun, LightSource::Point(PointLight::new(DVec3::X, DVec3::ONE))];
-        let bounds = Bounds::around([DVec3::ZERO, DVec3::new(3.0, 0.0, 4.0)].into_iter());
+        let bounds = Bounds::around([DVec3::ZERO, DVec3::new(3.0, 0.0, 4.0)]);
         let placed = LightSource::placed(&lights, || bounds);
         assert_eq!(placed[0].position, DVec3::new(1.5, 5e4, 2.0));
         assert_eq!(placed[0].intensity, DVec3::splat(25e8));
