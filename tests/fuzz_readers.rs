@@ -209,7 +209,7 @@ const OBJ: &str = "mtllib fuzz.mtl\no body\nv -1 -1 -1\nv 1 -1 -1\nv 1 1 -1\nv -
 
 const MTL: &str = "newmtl glass\nillum 7\nNi 1.5\nd 0.5\nTr 0.5\nTf 1 0.9 0.8\nPr 0.1\nKd 0 0 0\n\nnewmtl red\nKd 1 0 0\nKs 1 1 1\n\
     Ke 0 0 1\nNs 100\nPm 0.5\nillum 2\nmap_Kd -s 1 1 1 -o 0 0 tex.png\nmap_Bump -bm 0.5 tex.png\n\
-    map_d tex.png\nmap_Ke tex.png\nnorm tex.png\nmap_Pr -imfchan g tex.png\nmap_Pm -clamp on -mm 0 1 tex.png\n";
+    map_d tex.png\nmap_Ke tex.png\nnorm tex.png\nmap_Pr -imfchan g tex.png\nmap_Pm -clamp on -mm 0 1 tex.png\nmap_Ks tex.png\n";
 
 const TOML: &str = "[environment]\ncolor = [1, 1, 1]\nintensity = 1.0\nrotation = 0.0\nvisible = true\n\n[camera]\n\
     position = [0.0, 0.25, 0.9]\ntarget = [0.0, 0.1, 0.0]\nup = [0.0, 1.0, 0.0]\nvertical_fov = 35.0\n\n[render]\n\

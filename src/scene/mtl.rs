@@ -123,7 +123,7 @@ fn tidy_line(line: &str) -> Option<String> {
             let keyword = if keyword.ends_with("ump") { "bump_image" } else { keyword };
             image_of(rest).map(|(options, name)| format!("{keyword}_options {}\n{keyword} {name}", options.join(" ")))
         }
-        "map_Ks" | "map_Ns" | "map_Tr" => Some(format!("{keyword} {rest}")),
+        "map_Ks" | "map_Ns" | "map_Tr" => Some(format!("not_read {keyword}")),
         _ => Some(String::new()),
     }
 }
@@ -221,9 +221,7 @@ impl Converter<'_> {
         if matches!(surface, Surface::Dielectric(_)) && self.material.unknown_param.contains_key("map_Pm") {
             self.remark("map_Pm is not read of glass");
         }
-        if let Some(key) =
-            ["map_Ks", "map_Ns", "map_Tr"].into_iter().find(|key| self.material.unknown_param.contains_key(*key))
-        {
+        if let Some(key) = self.material.unknown_param.get("not_read") {
             self.remark(&format!("{key} is not read; the number is used"));
         }
         let mut material = Material::new(self.material.name.clone(), surface);

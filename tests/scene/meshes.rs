@@ -288,6 +288,8 @@ fn mtl_places_images() {
     }
     let scene = with_mtl(&folder, "map_Kd -mm 0.5 2 sky.png");
     assert!(scene.warnings[0].ends_with("map_Kd: -mm is not read"), "{:?}", scene.warnings);
+    let scene = with_mtl(&folder, "map_Ks sky.png");
+    assert!(scene.warnings[0].ends_with("map_Ks is not read; the number is used"), "{:?}", scene.warnings);
     let scene = with_mtl(&folder, "map_Bump -bm abc sky.png\nmap_Kd -s nan 2000 sky.png");
     let said = scene.warnings.join("\n");
     for wanted in ["map_Bump: -bm abc is no number; 1 is used", "map_Kd: -s NaN", "-s 2000 is not between"] {
