@@ -27,9 +27,9 @@ pub(super) fn rough(surface: &Surface) -> Option<String> {
 pub(super) fn absorbs(surface: &Surface) -> Option<String> {
     let dielectric = of_glass(surface)?;
     let (color, distance) = (dielectric.attenuation_color, dielectric.attenuation_distance);
-    let colored = distance.is_finite() && color.min_element() < 1.0;
     let [r, g, b] = color.as_vec3().to_array();
-    (colored && !dielectric.thin_walled).then(|| format!("white becomes {r}, {g}, {b} over {} m", distance as f32))
+    (dielectric.absorbs() && !dielectric.thin_walled)
+        .then(|| format!("white becomes {r}, {g}, {b} over {} m", distance as f32))
 }
 
 /// Light leaves a pane as it came, each colour in the same direction.

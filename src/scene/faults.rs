@@ -102,8 +102,7 @@ pub fn idle_insides(scene: &Scene) -> Vec<String> {
     let told = worn.into_iter().filter_map(|number| {
         let Material { name, surface, .. } = &scene.materials[number];
         let Surface::Dielectric(glass) = surface else { return None };
-        let absorbs = glass.attenuation_distance.is_finite() && glass.attenuation_color.min_element() < 1.0;
-        let what = match (absorbs, glass.disperses()) {
+        let what = match (glass.absorbs(), glass.disperses()) {
             (true, true) => "attenuation and dispersion show",
             (true, false) => "attenuation shows",
             (false, true) => "dispersion shows",

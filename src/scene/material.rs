@@ -105,6 +105,11 @@ impl Dielectric {
         }
     }
 
+    /// Whether white light has another colour after some way inside.
+    pub fn absorbs(&self) -> bool {
+        self.attenuation_distance.is_finite() && self.attenuation_color.min_element() < 1.0
+    }
+
     /// Whether the index changes with the wavelength.
     pub fn disperses(&self) -> bool {
         match self.dispersion {
